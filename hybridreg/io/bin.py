@@ -20,9 +20,9 @@ _NO_HEADER = "this format has no header to ask, so convert it to .npy with one p
 def parse_bin(data: bytes, name: str) -> NDArray[np.float64]:
     """Read x, y and z of float32 rows x, y, z, intensity (KITTI) or x, y, z, intensity, ring (nuScenes).
 
-    The size of the file decides between four and five numbers. Where it allows both (a multiple of 80) the
-    values decide: is the fifth a ring's number, is the fourth an intensity? Where they allow neither, the name
-    does (five for `.pcd.bin`); where they allow both, the file is refused. Shape (N, 3).
+    The file's size decides between four and five numbers. Where it allows both (a multiple of 80), the
+    values decide: is the fifth a ring's number, is the fourth an intensity? Where they allow neither, the
+    name does (five for `.pcd.bin`); where they allow both, the file is refused. Shape (N, 3).
     """
     if looks_like_text(data):
         raise fault(name, "is text, not float32 rows", "rename it to end in .txt")
@@ -44,10 +44,8 @@ def _width_by_values(data: bytes, name: str) -> int:
     fits_four = _is_intensity(_rows(data, _KITTI)[:, 3])
     fits_five = _is_ring(_rows(data, _NUSCENES)[:, 4])
     if fits_four and fits_five:
-        problem = (
-            f"its {len(data)} bytes are {len(data) // 16} rows of four numbers or {len(data) // 20} of five"
-        )
-        raise fault(name, f"{problem}, and both look right", _NO_HEADER)
+        rows = f"{len(data) // 16} rows of four numbers or {len(data) // 20} of five"
+        raise fault(name, f"its {len(data)} bytes are {rows}, and both look right", _NO_HEADER)
     if fits_four != fits_five:
         return _KITTI if fits_four else _NUSCENES
     return _NUSCENES if name.lower().endswith(".pcd.bin") else _KITTI

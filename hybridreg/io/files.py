@@ -13,9 +13,7 @@ def check_file(path: Path) -> None:
     if path.is_dir():
         raise IsADirectoryError(f"{path}: is a folder; name one file inside it")
     if not path.exists():
-        raise FileNotFoundError(
-            f"{path}: no such file; check the spelling (the current folder is {Path.cwd()})"
-        )
+        raise FileNotFoundError(f"{path}: no such file; check the name (the current folder is {Path.cwd()})")
     if not path.is_file():
         raise ValueError(f"{path}: is a device or a pipe; copy its content to a file first")
 

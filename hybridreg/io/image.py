@@ -24,8 +24,8 @@ def read_image(path: str | os.PathLike[str]) -> NDArray[np.uint8]:
     Parameters
     ----------
     path : path
-        A file of any kind that OpenCV decodes, whatever its name: grey, colour, with alpha (which is dropped), 8
-        or 16 bits (of which the full range becomes 0 to 255).
+        A file of any kind that OpenCV decodes, whatever its name: grey, colour, with alpha (which is
+        dropped), 8 or 16 bits (of which the full range becomes 0 to 255).
 
     Returns
     -------

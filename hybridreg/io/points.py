@@ -42,10 +42,10 @@ def read_points(path: str | os.PathLike[str]) -> NDArray[np.float64]:
     """Read the coordinates of a point cloud, in the file's own unit and frame.
 
     The file name's ending chooses the format: `.ply` (ascii, binary), `.pcd` (ascii, binary,
-    binary_compressed), `.bin` (float32 rows of four as in KITTI, or of five as in nuScenes' `.pcd.bin`), `.npy`,
-    `.npz` (array `xyz`, `points`, `arr_0` or the only one that fits), `.xyz`/`.txt`/`.csv`, `.las`/`.laz` (extra
-    `las`). A file that is not what its name says is refused. Rows that are not finite are kept: the gate
-    decides about them.
+    binary_compressed), `.bin` (float32 rows of four as in KITTI, or of five as in nuScenes' `.pcd.bin`),
+    `.npy`, `.npz` (array `xyz`, `points`, `arr_0` or the only one that fits), `.xyz`/`.txt`/`.csv`,
+    `.las`/`.laz` (extra `las`). A file that is not what its name says is refused. Rows that are not finite
+    are kept: the gate decides about them.
 
     Parameters
     ----------

@@ -28,9 +28,8 @@ def axis_columns(fields: Sequence[str], name: str) -> tuple[int, int, int]:
     lowered = [field.lower() for field in fields]
     for axis in AXES:
         if lowered.count(axis) != 1:
-            problem = (
-                f"has {lowered.count(axis)} fields called {axis!r} among {shorten(', '.join(fields), 200)}"
-            )
+            held = shorten(", ".join(fields), 200)
+            problem = f"has {lowered.count(axis)} fields called {axis!r} among {held}"
             raise fault(name, problem, "name the coordinates x, y and z, each once")
     return lowered.index("x"), lowered.index("y"), lowered.index("z")
 
@@ -39,7 +38,7 @@ def axis_columns(fields: Sequence[str], name: str) -> tuple[int, int, int]:
 class XyzRecord:
     """Where x, y and z lie in a packed binary record of `size` bytes, and their numpy types.
 
-    Offsets instead of a dtype with all names, because files repeat names (PCD's padding `_`) or leave them out.
+    Offsets instead of a dtype with all names, because files repeat names (PCD's padding `_`) or omit them.
     """
 
     codes: tuple[str, str, str]

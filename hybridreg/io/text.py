@@ -20,10 +20,10 @@ _DELIMITERS = (";", ",", "\t")
 def parse_text(data: bytes, name: str) -> NDArray[np.float64]:
     """Read x, y and z of text rows separated by spaces, tabs, commas or semicolons; shape (N, 3).
 
-    Lines that begin with `#`, `//`, `%` or `;` are comments. A first row of names (also behind a comment mark,
-    as CloudCompare writes it) tells which columns are x, y and z, otherwise the first three are. A first row of
-    one whole number (PTS, XYZ) is the count of the points and must agree. With semicolons, a comma is a decimal
-    point.
+    Lines that begin with `#`, `//`, `%` or `;` are comments. A first row of names (CloudCompare puts it
+    behind a comment mark) tells which columns are x, y and z, otherwise the first three are. A first row of
+    one whole number (PTS, XYZ) is the count of the points and must agree. With semicolons, a comma is a
+    decimal point.
     """
     if looks_binary(data):
         raise fault(name, "is not plain text: it holds zero bytes", "save it as UTF-8 text")

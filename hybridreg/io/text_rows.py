@@ -21,9 +21,8 @@ def promised_lines(lines: list[str], start: int, count: int, width: int, name: s
     if len(rows) < count:
         raise fault(name, f"its header promises {count} points, it holds {len(rows)} lines of them")
     if rows and len(rows[-1].split()) < width:
-        raise fault(
-            name, f"its last point has {len(rows[-1].split())} of {width} values: {shorten(rows[-1])}"
-        )
+        held = len(rows[-1].split())
+        raise fault(name, f"its last point has {held} of {width} values: {shorten(rows[-1])}")
     return rows
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from hybridreg.io.atomic import write_bytes, write_text
 from hybridreg.io.faults import fault
@@ -29,8 +29,8 @@ def write_points(
     points : array of shape (N, 3)
         Written as they are, also where they are not finite.
     dtype : {"float64", "float32"}
-        float64 loses nothing. Some programs (PCL's `PointXYZ`) read float32 only, which keeps millimetres up to
-        16 km from the origin.
+        float64 loses nothing. Some programs (PCL's `PointXYZ`) read float32 only, which keeps millimetres up
+        to 16 km from the origin.
 
     Raises
     ------
