@@ -55,7 +55,7 @@ cloud = {
     "line": lambda: np.c_[np.linspace(0, 50, n), rng.normal(0, 0.01, (n, 2))],
     "plane": lambda: np.c_[rng.uniform(0, 30, (n, 2)), rng.normal(0, 1e-3, n)],
     "apart": lambda: rng.uniform(0, 1e4, (n, 3)),
-    "twice": lambda: np.repeat(rng.uniform(0, 20, (n // 10, 3)), 10, axis=0),
+    "twice": lambda: np.repeat(rng.uniform(0, 20, (n // 4, 3)), 4, axis=0),
 }[sys.argv[1]]
 scene = hr.Scene(
     pair=hr.Pair.of(cloud(), cloud()),
