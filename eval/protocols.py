@@ -37,8 +37,16 @@ class Protocol:
 
     def describe(self) -> str:
         """The rule in words, for a caption."""
-        rule = f"RMSE < {self.rmse_m:g} m" if self.rmse_m else f"RRE < {self.rre_deg:g}° and RTE < {self.rte_m:g} m"
-        over = {"all": "all pairs", "success": "successes", "criterion": "pairs that meet that error's threshold"}
+        rule = (
+            f"RMSE < {self.rmse_m:g} m"
+            if self.rmse_m
+            else f"RRE < {self.rre_deg:g}° and RTE < {self.rte_m:g} m"
+        )
+        over = {
+            "all": "all pairs",
+            "success": "successes",
+            "criterion": "pairs that meet that error's threshold",
+        }
         return f"protocol {self.name}: success {rule}, inliers within {self.inlier_m:g} m, means over {over[self.average]}"
 
 

@@ -38,7 +38,9 @@ def build(changes: Mapping[str, Any]) -> Pipeline:
     if unknown:
         raise ValueError(f"{', '.join(sorted(unknown))}: unknown; a pipeline is told by {', '.join(KEYS)}")
     if "preset" in changes and "pipeline" in changes:
-        raise ValueError(f"preset={changes['preset']!r} and pipeline={changes['pipeline']!r}: leave one of them out")
+        raise ValueError(
+            f"preset={changes['preset']!r} and pipeline={changes['pipeline']!r}: leave one of them out"
+        )
     if "pipeline" in changes:
         start = Pipeline.load(changes["pipeline"])
     else:
@@ -83,7 +85,9 @@ def parse(settings: Iterable[str]) -> dict[str, Any]:
         key, equals, value = text.partition("=")
         slot, dot, field = key.strip().partition(".")
         if not equals or not slot or (dot and not field) or "." in field:
-            raise ValueError(f"--set {text}: expected slot=name or slot.field=value, such as match.radius=1.25")
+            raise ValueError(
+                f"--set {text}: expected slot=name or slot.field=value, such as match.radius=1.25"
+            )
         changes = merge(changes, {slot: {field: _value(value)} if dot else _value(value)})
     return changes
 

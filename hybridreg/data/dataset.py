@@ -60,7 +60,9 @@ def ids_of(pairs: Sequence[LabelledPair]) -> tuple[str, ...]:
     ids = tuple(known) if known is not None else tuple(labelled.pair.id for labelled in pairs)
     if len(set(ids)) < len(ids):
         double = next(i for i in ids if ids.count(i) > 1)
-        raise ValueError(f"the data set has {ids.count(double)} pairs called {double!r}; give each its own id")
+        raise ValueError(
+            f"the data set has {ids.count(double)} pairs called {double!r}; give each its own id"
+        )
     return ids
 
 

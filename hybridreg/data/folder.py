@@ -37,7 +37,9 @@ class PairFolder(Dataset):
     def __init__(self, root: str | os.PathLike[str]) -> None:
         folder = Path(root)
         if not folder.is_dir():
-            raise FileNotFoundError(f"{folder}: there is no such folder; it must hold one folder for each pair")
+            raise FileNotFoundError(
+                f"{folder}: there is no such folder; it must hold one folder for each pair"
+            )
         self.root = folder
         self._ids = tuple(sorted(f.name for f in folder.iterdir() if _is_pair(f)))
         if not self.ids:
@@ -65,7 +67,9 @@ class PairFolder(Dataset):
         for name in self.ids:
             files = _files(self.root / name)
             sizes = {kind: file.stat().st_size for kind, file in files.items()}
-            digest = zlib.crc32(repr((name, sorted(sizes.items()))).encode() + files["meta"].read_bytes(), digest)
+            digest = zlib.crc32(
+                repr((name, sorted(sizes.items()))).encode() + files["meta"].read_bytes(), digest
+            )
         return f"{digest:08x}"
 
 
@@ -96,5 +100,7 @@ def _read_meta(path: Path) -> dict[str, Any]:
     except ValueError as error:
         raise ValueError(f"{path}: not a JSON file ({error})") from error
     if not isinstance(meta, dict) or "T_target_source" not in meta:
-        raise ValueError(f"{path}: T_target_source is missing; it must be the 4x4 pose that maps source to target")
+        raise ValueError(
+            f"{path}: T_target_source is missing; it must be the 4x4 pose that maps source to target"
+        )
     return meta
