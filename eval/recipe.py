@@ -106,6 +106,19 @@ def slug(name: str) -> str:
     return re.sub(r"[^a-z0-9.]+", "-", name.lower()).strip("-.") or "row"
 
 
+def title_of(changed: Mapping[str, Any]) -> str:
+    """Name of a line that has none of its own: what it changes."""
+    parts = []
+    for key, value in changed.items():
+        if isinstance(value, Mapping):
+            stage = [str(value["stage"])] if "stage" in value else []
+            text = " ".join(stage + [f"{k}={v}" for k, v in value.items() if k != "stage"])
+        else:
+            text = str(value)
+        parts.append(text if key == "preset" else f"{key} {text}")
+    return ", ".join(parts) or "base"
+
+
 def _shipped() -> Any:
     return files("hybridreg.eval").joinpath("tables")
 
@@ -114,7 +127,7 @@ def _rows(base: Mapping[str, Any], rows: list[dict[str, Any]]) -> Iterator[Line]
     for row in rows:
         changed = {key: value for key, value in row.items() if key != "name"}
         yield Line(
-            name=row.get("name") or _title(changed), method=changes.build(changes.merge(base, changed))
+            name=row.get("name") or title_of(changed), method=changes.build(changes.merge(base, changed))
         )
 
 
@@ -129,9 +142,9 @@ def _grid(base: Mapping[str, Any], sweep: Mapping[str, Any]) -> Iterator[Line]:
             slot, _, field = key.partition(".")
             changed = changes.merge(changed, {slot: {field: value} if field else value})
         try:
-            yield Line(name=_title(changed), method=changes.build(changes.merge(base, changed)))
+            yield Line(name=title_of(changed), method=changes.build(changes.merge(base, changed)))
         except ValueError as error:
-            yield Line(name=_title(changed), method=None, problem=str(error))
+            yield Line(name=title_of(changed), method=None, problem=str(error))
 
 
 def _axes(sweep: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, list[Any]]]:
@@ -142,15 +155,3 @@ def _axes(sweep: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, lis
             yield prefix + key, value
         else:
             raise ValueError(f"sweep {prefix}{key}: expected a list of values, got {value!r}")
-
-
-def _title(changed: Mapping[str, Any]) -> str:
-    parts = []
-    for key, value in changed.items():
-        if isinstance(value, Mapping):
-            stage = [str(value["stage"])] if "stage" in value else []
-            text = " ".join(stage + [f"{k}={v}" for k, v in value.items() if k != "stage"])
-        else:
-            text = str(value)
-        parts.append(text if key == "preset" else f"{key} {text}")
-    return ", ".join(parts) or "base"

@@ -54,13 +54,7 @@ class PairFolder(Dataset):
         return self._ids
 
     def load(self, index: int) -> LabelledPair:
-        name = self.ids[index]
-        files = _files(self.root / name)
-        meta = _read_meta(files["meta"])
-        facts = {key: meta[key] for key in _FREE_FACTS if key in meta}
-        pair = Pair.of(files["source"], files["target"], files.get("image"), id=name, meta=facts)
-        truth = se3.check(meta["T_target_source"], f"{files['meta']}: T_target_source")
-        return LabelledPair(pair=pair, T_target_source=truth, overlap=meta.get("overlap"))
+        return load_pair(self.root / self.ids[index])
 
     def fingerprint(self) -> str:
         digest = 0
@@ -71,6 +65,16 @@ class PairFolder(Dataset):
                 repr((name, sorted(sizes.items()))).encode() + files["meta"].read_bytes(), digest
             )
         return f"{digest:08x}"
+
+
+def load_pair(folder: Path) -> LabelledPair:
+    """Read the pair of one folder; its name is the pair's id."""
+    files = _files(folder)
+    meta = _read_meta(files["meta"])
+    facts = {key: meta[key] for key in _FREE_FACTS if key in meta}
+    pair = Pair.of(files["source"], files["target"], files.get("image"), id=folder.name, meta=facts)
+    truth = se3.check(meta["T_target_source"], f"{files['meta']}: T_target_source")
+    return LabelledPair(pair=pair, T_target_source=truth, overlap=meta.get("overlap"))
 
 
 def _is_pair(folder: Path) -> bool:
