@@ -126,13 +126,18 @@ def identity(rows: Sequence[Row]) -> list[Row]:
 
 
 def inlier_ratios(rows: Sequence[Row], protocol: Protocol) -> Array:
-    """Share of right matches of each row that has matches, at the protocol's radius."""
+    """Share of right matches of each row at the protocol's radius; empty for a method that makes no matches.
+
+    A pair at which a method that matches has found none counts as 0.
+    """
     key = f"{protocol.inlier_m:g}"
-    stored = [row.inlier_ratio for row in rows if row.inlier_ratio is not None and row.n_matches]
+    if not any(row.n_matches for row in rows):
+        return np.zeros(0)
+    stored = [row.inlier_ratio for row in rows if row.inlier_ratio]
     lacking = next((ratio for ratio in stored if key not in ratio), None)
     if lacking is not None:
         raise ValueError(f"inlier ratios are stored at {', '.join(lacking)} m, not at {key} m; predict again")
-    return np.array([ratio[key] for ratio in stored])
+    return np.array([(row.inlier_ratio or {}).get(key, 0.0) for row in rows if row.T_true is not None])
 
 
 def mean_seconds(rows: Sequence[Row]) -> dict[str, float]:

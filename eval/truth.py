@@ -67,11 +67,15 @@ def _judged(tried: Attempt) -> dict[str, Any]:
     }
     return {
         "verdict": result.verdict,
-        "confidence": float(result.confidence),
+        "confidence": _finite(result.confidence),
         "reasons": list(result.reasons),
-        "evidence": {**own, **{key: float(value) for key, value in result.evidence.items()}},
+        "evidence": {key: _finite(value) for key, value in {**own, **result.evidence}.items()},
         "notes": list(result.notes),
     }
+
+
+def _finite(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None
 
 
 def _level_sizes(trace: Trace | None) -> dict[str, int]:
