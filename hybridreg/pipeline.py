@@ -117,7 +117,11 @@ class Pipeline(Stage):
             For clouds that no pose can be computed from, naming cloud, number and cure.
         """
         reset_peak_memory()
-        trace = self.trace(pair, seed=seed, matches=matches)
+        return self.conclude(self.trace(pair, seed=seed, matches=matches), seed=seed)
+
+    def conclude(self, trace: Trace, *, seed: int = 0) -> RegistrationResult:
+        """The verdict on a traced run, and its result in the coordinates that the user gave."""
+        pair = trace.scene.pair
         with stopwatch(trace.seconds, "verdict"):
             from hybridreg.verdict import judge
 
