@@ -62,5 +62,5 @@ def _errors(row: Row, step: Step) -> tuple[float, float, float, bool]:
         return np.nan, np.nan, np.nan, True
     T = np.eye(4) if failed else np.array(found)
     truth = np.array(row.T_true)
-    rmse = np.nan if not row.overlap else metrics.rmse_m(T, truth, np.array(row.moments))
+    rmse = np.nan if row.moments is None or not row.overlap else metrics.rmse_m(T, truth, np.array(row.moments))
     return metrics.rre_deg(T, truth), metrics.rte_m(T, truth), rmse, failed

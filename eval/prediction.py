@@ -40,7 +40,10 @@ def predict(
     seed : int
         With a pair's id it fixes all randomness, so that neither order nor workers change a row.
     workers : int or None
-        Processes, each with one thread. None takes what `joblib.parallel_config` says, else 1.
+        Processes, each with one thread. None takes what `joblib.parallel_config` says, else 1: under
+        `joblib.parallel_config(backend="dask")` the pairs spread over a cluster, and a lost machine's pairs are
+        done by the others. A pair that kills its process is a failed row with two or more workers; alone it takes
+        this process along, and on dask joblib (1.6) waits for it for ever.
     overwrite : bool
         Begin anew, whatever the file holds.
     data : str
@@ -117,7 +120,7 @@ def _rows(
             left.discard(row.index)
             yield row
     except TerminatedWorkerError:
-        # Some pair killed its process, and took the pool along. Alone in a process each, the others go through.
+        # Some pair killed its process and took others along. Each in a process of its own, the others go through.
         yield from _one_by_one(method, pairs, ids, sorted(left), seed)
 
 

@@ -106,7 +106,7 @@ class Moody:
         if self.log:
             with Path(self.log).open("a") as file:
                 file.write(f"{pair.id} {os.getpid()}\n")
-        mood = self.moods[int(pair.id.rpartition("-")[2]) % len(self.moods)]
+        mood = self.moods[int(pair.id.partition("@")[0].rpartition("-")[2]) % len(self.moods)]
         if mood == "raise":
             raise RuntimeError(f"{pair.id}\nis beyond me")
         if mood == "die":
