@@ -6,9 +6,10 @@ from __future__ import annotations
 from typing import Literal, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
+
 from hybridreg.eval.errors import Errors
 from hybridreg.eval.protocols import Protocol
-from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 

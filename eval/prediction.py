@@ -8,13 +8,12 @@ import os
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
+from hybridreg.data.dataset import fingerprint_of, ids_of
 from hybridreg.eval import truth
 from hybridreg.eval.attempt import Method, attempt, one_line
 from hybridreg.eval.row import Row
 from hybridreg.eval.store import Appender
 from hybridreg.eval.threads import one_thread
-
-from hybridreg.data.dataset import fingerprint_of, ids_of
 from hybridreg.pair import LabelledPair
 
 

@@ -7,11 +7,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
+
 from hybridreg.eval import bootstrap, errors
 from hybridreg.eval.errors import Errors, Step
 from hybridreg.eval.protocols import RECALL_AT, Protocol
 from hybridreg.eval.row import Row
-from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]

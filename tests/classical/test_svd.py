@@ -3,10 +3,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from conftest import planted, random_pose
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from conftest import planted, random_pose
 from hybridreg import se3
 from hybridreg.classical.svd import STATUSES, WeightedSvd, kabsch, kabsch_batch
 from hybridreg.matches import Correspondences

@@ -128,7 +128,9 @@ def test_a_broken_line_in_the_middle_is_named(tmp_path: Path) -> None:
         ({"data": "other"}, 'data.name: "" before, "other" now'),
     ],
 )
-def test_a_changed_configuration_is_refused_and_named(tmp_path: Path, change: dict[str, Any], told: str) -> None:
+def test_a_changed_configuration_is_refused_and_named(
+    tmp_path: Path, change: dict[str, Any], told: str
+) -> None:
     path = tmp_path / "p.jsonl"
     first = {"method": RowByRow(), "pairs": Scattered(2), "seed": 0, "data": ""}
 

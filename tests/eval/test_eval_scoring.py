@@ -69,7 +69,9 @@ def test_a_pair_that_could_not_be_read_counts_against_recall_only() -> None:
 
 def test_success_is_strict() -> None:
     exact = Protocol(name="x", rre_deg=2.0, rte_m=0.5, inlier_m=1.0, average="all", source="")
-    measured = errors.Errors(np.array([2.0, 1.0, 1.0]), np.array([0.1, 0.5, 0.1]), np.zeros(3), np.zeros(3, bool))
+    measured = errors.Errors(
+        np.array([2.0, 1.0, 1.0]), np.array([0.1, 0.5, 0.1]), np.zeros(3), np.zeros(3, bool)
+    )
     assert measured.success(exact).tolist() == [False, False, True]
 
 
@@ -114,7 +116,9 @@ def test_a_method_that_has_no_matches_at_one_pair_is_charged_for_it_once() -> No
 
 
 def test_a_method_without_matches_has_no_inlier_ratio() -> None:
-    assert np.isnan(score([row(0, 1, 1, inlier_ratio={"1": 0.0}, n_matches=0), row(1, 1, 1)], CROSS).inlier_ratio)
+    assert np.isnan(
+        score([row(0, 1, 1, inlier_ratio={"1": 0.0}, n_matches=0), row(1, 1, 1)], CROSS).inlier_ratio
+    )
 
 
 def test_no_rows_are_refused() -> None:
