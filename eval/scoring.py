@@ -33,7 +33,8 @@ class Score:
     rre_deg_ok, rte_m_ok : means over successes
     rre_deg_criterion, rte_m_criterion : each over the pairs that meet that error's own threshold
     rre_deg_median, rte_m_median : over all pairs
-    inlier_ratio, fmr : mean share of right matches, and share of pairs with at least 5 % of them; NaN without matches
+    inlier_ratio, fmr : mean share of right matches, and share of pairs with at least 5 % of them; NaN for a
+        method that makes no matches
     recall_estimated : recall of the poses before refinement; NaN where a method does not tell them
     recall_at : recall at fixed thresholds, by their text
     mask_f1 : mean F1 of the overlap masks; NaN without them

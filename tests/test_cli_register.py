@@ -28,8 +28,8 @@ def judged(self: hr.Pipeline, trace: Trace, *, seed: int = 0, verdict: Any = "ok
         transformation=trace.refined.T, verdict=verdict, confidence=0.5, reasons=("because", "and so"),
         fitness=0.7, inlier_rmse=0.1, correspondence_set=np.zeros((3, 2), np.int64), fitness_target=0.6,
         max_distance=0.5, information=np.eye(6), rivals=np.zeros((0, 4, 4)), matches=trace.matches,
-        evidence={"violations": 0.01}, notes=tuple(trace.scene.notes), seconds={**trace.seconds, "verdict": 0.01},
-        peak_memory_mb=1.0, seed=seed, spec=self.to_spec(),
+        evidence={"violations": 0.01}, notes=tuple(trace.scene.notes),
+        seconds={**trace.seconds, "verdict": 0.01}, peak_memory_mb=1.0, seed=seed, spec=self.to_spec(),
     )  # fmt: skip
 
 
@@ -50,7 +50,7 @@ def verdict(monkeypatch: pytest.MonkeyPatch) -> Any:
 def clouds(tmp_path: Path) -> tuple[str, str]:
     """A pair that lies nearly right, as two files."""
     pair, _ = testing.sample_pair()
-    source = np.asarray(pair.target.points) + [0.2, -0.1, 0.05]
+    source = pair.target.points + np.array([0.2, -0.1, 0.05])
     np.save(tmp_path / "a.npy", source)
     np.savetxt(tmp_path / "b.xyz", pair.target.points)
     return str(tmp_path / "a.npy"), str(tmp_path / "b.xyz")

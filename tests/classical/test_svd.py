@@ -3,9 +3,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from conftest import planted, random_pose
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from made_matches import planted, random_pose
 
 from hybridreg import se3
 from hybridreg.classical.svd import STATUSES, WeightedSvd, kabsch, kabsch_batch
