@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
-from hybridreg.classical.voxel import voxel_centroids
 from numpy.typing import NDArray
 
+from hybridreg.classical.voxel import voxel_centroids
 from hybridreg.fitness import measure
 from hybridreg.matches import Pose
 from hybridreg.normals import tree

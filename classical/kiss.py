@@ -6,11 +6,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from hybridreg.classical.gicp import Gicp
-from hybridreg.classical.voxel import voxel_centroids
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from hybridreg.classical.gicp import Gicp
+from hybridreg.classical.voxel import voxel_centroids
 from hybridreg.fitness import measure
 from hybridreg.matches import Correspondences, Pose
 from hybridreg.normals import tree

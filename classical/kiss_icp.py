@@ -6,9 +6,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+
 from hybridreg.classical.gicp import not_worse
 from hybridreg.classical.voxel import voxel_centroids
-
 from hybridreg.matches import Pose
 from hybridreg.scene import Scene
 from hybridreg.stage import Stage

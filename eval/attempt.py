@@ -26,7 +26,7 @@ class Traceable(Protocol):
     def conclude(self, trace: Trace, *, seed: int = 0) -> RegistrationResult: ...
 
 
-# Or plainly a function of pair and seed that returns a 4x4 pose, a RegistrationResult, or None for "not found".
+# Or a function of pair and seed that returns a 4x4 pose, a RegistrationResult, or None for "not found".
 Method = Traceable | Callable[[Pair, int], Any]
 
 
@@ -61,7 +61,7 @@ def _traced(method: Traceable, pair: Pair, seed: int) -> Attempt:
     trace = method.trace(pair, seed=seed)
     result = method.conclude(trace, seed=seed)
     return Attempt(
-        # A pose that was not found is the identity as a placeholder, which near-by pairs would count as right.
+        # A pose that was not found is the identity, which near-by pairs would count as right.
         T=result.transformation if trace.refined.found else None,
         T_estimated=raise_pose(trace.estimated.T, pair) if trace.estimated.found else None,
         seconds=dict(result.seconds),

@@ -20,15 +20,15 @@ def interval(
 ) -> tuple[float, float]:
     """Percentile bootstrap interval of the mean of `values` (n,).
 
-    Whole groups are drawn, because a pair and its turned copies share a scene: drawn one by one they would make
-    the interval too narrow. Values that are not finite are left out.
+    Whole groups are drawn, because a pair and its turned copies share a scene: drawn one by one they would
+    make the interval too narrow. Values that are not finite are left out.
     """
     keep = np.isfinite(values)
     if not keep.any():
         return float("nan"), float("nan")
     names, member = np.unique(np.asarray(groups)[keep], return_inverse=True)
     sums = np.bincount(member, weights=values[keep], minlength=len(names))
-    counts = np.bincount(member, minlength=len(names))
+    counts = np.bincount(member, minlength=len(names)).astype(np.float64)
     rng = np.random.default_rng(seed)
     part = max(1, _CELLS // len(names))
     means = np.concatenate(
@@ -38,7 +38,7 @@ def interval(
     return float(low), float(high)
 
 
-def _means(sums: Array, counts: NDArray[np.int64], n: int, rng: np.random.Generator) -> Array:
+def _means(sums: Array, counts: Array, n: int, rng: np.random.Generator) -> Array:
     draw = rng.integers(len(sums), size=(n, len(sums)))
     means: Array = sums[draw].sum(axis=1) / counts[draw].sum(axis=1)
     return means

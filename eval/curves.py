@@ -6,9 +6,10 @@ from __future__ import annotations
 from typing import Literal, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
+
 from hybridreg.eval.errors import Errors
 from hybridreg.eval.protocols import Protocol
-from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
@@ -21,7 +22,7 @@ class Curve(NamedTuple):
 
 
 def sweep(errors: Errors, protocol: Protocol, which: Literal["rre", "rte"], n: int = 101) -> Curve:
-    """Recall against one threshold from zero to five times the protocol's, the other held at the protocol's."""
+    """Recall against one threshold, from zero to five times the protocol's; the other stays at its own."""
     widest = 5.0 * (protocol.rre_deg if which == "rre" else protocol.rte_m)
     thresholds = np.linspace(0.0, widest, n)
     if which == "rre":

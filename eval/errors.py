@@ -8,10 +8,11 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
+
 from hybridreg.eval import metrics
 from hybridreg.eval.protocols import Protocol
 from hybridreg.eval.row import Row
-from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -62,5 +63,7 @@ def _errors(row: Row, step: Step) -> tuple[float, float, float, bool]:
         return np.nan, np.nan, np.nan, True
     T = np.eye(4) if failed else np.array(found)
     truth = np.array(row.T_true)
-    rmse = np.nan if row.moments is None or not row.overlap else metrics.rmse_m(T, truth, np.array(row.moments))
+    rmse = (
+        np.nan if row.moments is None or not row.overlap else metrics.rmse_m(T, truth, np.array(row.moments))
+    )
     return metrics.rre_deg(T, truth), metrics.rte_m(T, truth), rmse, failed

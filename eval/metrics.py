@@ -53,8 +53,8 @@ def second_moments(points: Array) -> Array:
 def rmse_m(T: Array, truth: Array, moments: Array) -> float:
     """Root mean square of `|T p - T_true p|` over the points behind `moments` (4, 4), metres.
 
-    With the points of the true overlap this is the registration RMSE of the 3DMatch benchmark; the quadratic form
-    `tr(D M D^T)`, `D = T - T_true`, lets it be computed long after the points are gone.
+    With the points of the true overlap this is the registration RMSE of the 3DMatch benchmark; the quadratic
+    form `tr(D M D^T)`, `D = T - T_true`, lets it be computed long after the points are gone.
     """
     difference = (T - truth)[:3]
     return float(np.sqrt(max(np.trace(difference @ moments @ difference.T), 0.0)))

@@ -59,6 +59,7 @@ def filterable(lines: Sequence[Cells], *, success: str, text_from: str) -> str:
         '<p><input type="search" id="pairs-filter" placeholder="words to look for"> '
         '<label><input type="checkbox" id="pairs-missed"> missed only</label> '
         '<span id="pairs-count"></span></p>\n'
-        f'<div class="scroll"><table id="pairs"><thead><tr>{cells}</tr></thead><tbody></tbody></table></div>\n'
+        f'<div class="scroll"><table id="pairs"><thead><tr>{cells}</tr></thead>'
+        "<tbody></tbody></table></div>\n"
         f'<script type="application/json" id="pairs-data">{stored}</script>'
     )

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Run a method over a data set, once: rows go to disk as they are done, and a broken run goes on where it stood."""
+"""Run a method over a data set, once: rows go to disk as they are done, a broken run goes on from there."""
 
 from __future__ import annotations
 
@@ -8,13 +8,12 @@ import os
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
+from hybridreg.data.dataset import fingerprint_of, ids_of
 from hybridreg.eval import truth
 from hybridreg.eval.attempt import Method, attempt, one_line
 from hybridreg.eval.row import Row
 from hybridreg.eval.store import Appender
 from hybridreg.eval.threads import one_thread
-
-from hybridreg.data.dataset import fingerprint_of, ids_of
 from hybridreg.pair import LabelledPair
 
 
@@ -41,9 +40,9 @@ def predict(
         With a pair's id it fixes all randomness, so that neither order nor workers change a row.
     workers : int or None
         Processes, each with one thread. None takes what `joblib.parallel_config` says, else 1: under
-        `joblib.parallel_config(backend="dask")` the pairs spread over a cluster, and a lost machine's pairs are
-        done by the others. A pair that kills its process is a failed row with two or more workers; alone it takes
-        this process along, and on dask joblib (1.6) waits for it for ever.
+        `joblib.parallel_config(backend="dask")` the pairs spread over a cluster, and those of a lost machine
+        are done by the others. A pair that kills its process is a failed row with two or more workers; with
+        one it takes this process along, and on dask joblib (1.6) waits for it for ever.
     overwrite : bool
         Begin anew, whatever the file holds.
     data : str
@@ -77,7 +76,7 @@ def predict(
 
 
 def describe(method: Any) -> dict[str, Any]:
-    """What identifies a method in a stored configuration: a pipeline's spec, or a callable's name and fields."""
+    """What identifies a method in a configuration: a pipeline's spec, or a callable's name and fields."""
     if hasattr(method, "to_spec"):
         spec: dict[str, Any] = method.to_spec()
         return spec
@@ -120,7 +119,7 @@ def _rows(
             left.discard(row.index)
             yield row
     except TerminatedWorkerError:
-        # Some pair killed its process and took others along. Each in a process of its own, the others go through.
+        # Some pair killed its process and took others along. Alone in a process each, the others go through.
         yield from _one_by_one(method, pairs, ids, sorted(left), seed)
 
 

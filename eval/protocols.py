@@ -6,7 +6,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-# Over all pairs; over successes; each error over the pairs that meet its own threshold, whatever the other does.
+# Over all pairs; over successes; each error over the pairs that meet its own threshold alone.
 Average = Literal["all", "success", "criterion"]
 
 
@@ -47,7 +47,10 @@ class Protocol:
             "success": "successes",
             "criterion": "pairs that meet that error's threshold",
         }
-        return f"protocol {self.name}: success {rule}, inliers within {self.inlier_m:g} m, means over {over[self.average]}"
+        return (
+            f"protocol {self.name}: success {rule}, inliers within {self.inlier_m:g} m, "
+            f"means over {over[self.average]}"
+        )
 
 
 _ALL = (

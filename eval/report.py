@@ -122,7 +122,7 @@ def worst(table: Table, protocol: Protocol) -> list[tuple[str, Row]]:
         measured = [row for row in entry.rows if row.T_true is not None]
         # Where there is no pose the error of the identity decides which is worse.
         posed = [row if row.T is not None else identity([row])[0] for row in measured]
-        order = np.argsort(-figures.badness(posed, protocol), kind="stable") if measured else []
+        order = np.argsort(-figures.badness(posed, protocol), kind="stable")
         ranked.append([(entry.name, measured[i]) for i in order])
     turns = [each[k] for k in range(_MOST_VIEWS) for each in ranked if k < len(each)]
     return turns[:_MOST_VIEWS]

@@ -23,8 +23,8 @@ class Row:
     ----------
     index, id : place and name of the pair in its data set
     T : 4x4 or None
-        The pose found, source to target; None where the method failed or found nothing. Poses here are between
-        the clouds with their `offsets` taken off, which are None except on map grids.
+        The pose found, source to target; None where the method failed or found nothing. Poses here are
+        between the clouds with their `offsets` taken off, which are None except on map grids.
     T_estimated : 4x4 or None
         The pose before refinement, where the method tells it.
     error : str or None

@@ -7,11 +7,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
+
 from hybridreg.eval import bootstrap, errors
 from hybridreg.eval.errors import Errors, Step
 from hybridreg.eval.protocols import RECALL_AT, Protocol
 from hybridreg.eval.row import Row
-from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -32,7 +33,8 @@ class Score:
     rre_deg_ok, rte_m_ok : means over successes
     rre_deg_criterion, rte_m_criterion : each over the pairs that meet that error's own threshold
     rre_deg_median, rte_m_median : over all pairs
-    inlier_ratio, fmr : mean share of right matches, and share of pairs with at least 5 % of them; NaN without matches
+    inlier_ratio, fmr : mean share of right matches, and share of pairs with at least 5 % of them; NaN for a
+        method that makes no matches
     recall_estimated : recall of the poses before refinement; NaN where a method does not tell them
     recall_at : recall at fixed thresholds, by their text
     mask_f1 : mean F1 of the overlap masks; NaN without them

@@ -6,13 +6,13 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from scipy.spatial import cKDTree
+
+from hybridreg import se3
 from hybridreg.eval import metrics
 from hybridreg.eval.attempt import Attempt
 from hybridreg.eval.protocols import INLIER_RADII
 from hybridreg.eval.row import Matrix, Row, matrix
-from scipy.spatial import cKDTree
-
-from hybridreg import se3
 from hybridreg.frames import lower_pose
 from hybridreg.matches import Correspondences
 from hybridreg.pair import LabelledPair, Pair

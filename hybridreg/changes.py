@@ -26,8 +26,8 @@ def build(changes: Mapping[str, Any]) -> Pipeline:
     Parameters
     ----------
     changes : mapping
-        `preset` a name or `pipeline` a TOML file, `voxel` metres, and for each slot a stage's name, a table with
-        `stage` for another stage, or a table without it for other fields of the stage that is there.
+        `preset` a name or `pipeline` a TOML file, `voxel` metres, and for each slot a stage's name, a table
+        with `stage` for another stage, or a table without it for other fields of the stage that is there.
 
     Raises
     ------
@@ -60,7 +60,7 @@ def apply(pipeline: Pipeline, changes: Mapping[str, Any]) -> Pipeline:
 
 
 def merge(base: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
-    """`base` overlaid by `changes`; the fields of one stage are joined, another stage replaces the old one."""
+    """`base` overlaid by `changes`; fields of one stage are joined, another stage replaces the old one."""
     merged = dict(base)
     for key, change in changes.items():
         before = merged.get(key)

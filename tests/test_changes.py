@@ -59,7 +59,9 @@ def test_a_setting_that_is_none_is_refused(text: str) -> None:
         ({"preset": "icp", "refine": {"iteration": 3}}, ValueError, "its fields are .*iterations"),
     ],
 )
-def test_a_change_that_cannot_be_made_is_named(given: dict[str, object], error: type[Exception], told: str) -> None:
+def test_a_change_that_cannot_be_made_is_named(
+    given: dict[str, object], error: type[Exception], told: str
+) -> None:
     with pytest.raises(error, match=told):
         changes.build(given)
 

@@ -39,7 +39,7 @@ def command(
 
 
 def _data(done: Table, data: str | None) -> Sequence[LabelledPair] | None:
-    # The views are an extra: data that has gone must not keep anyone from scoring. Asked for by name, it must open.
+    # The views are an extra: data that has gone must not keep anyone from scoring. Named, it must open.
     from hybridreg.cli.running import with_starts
     from hybridreg.data import open_dataset
 

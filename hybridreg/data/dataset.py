@@ -14,8 +14,8 @@ from hybridreg.pair import LabelledPair
 class Dataset(Sequence[LabelledPair], ABC):
     """A sequence of pairs that reads each of them when it is asked for.
 
-    Any sequence of `LabelledPair` can be evaluated; this class adds names without reading, which makes resuming
-    quick, and a fingerprint, by which a changed data set is noticed.
+    Any sequence of `LabelledPair` can be evaluated; this class adds names without reading, which makes
+    resuming quick, and a fingerprint, by which a changed data set is noticed.
     """
 
     @property

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A folder of pairs as a data set: one folder each, `source.*`, `target.*`, perhaps `image.*`, and `meta.json`."""
+"""A folder of pairs: a folder each with `source.*`, `target.*`, perhaps `image.*`, and `meta.json`."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _FREE_FACTS = ("kind", "source_sensor", "target_sensor", "licence")
 
 
 class PairFolder(Dataset):
-    """Pairs that lie in the sub-folders of `root`; sub-folders without a source and a `meta.json` are passed over.
+    """Pairs in the sub-folders of `root`; those that hold neither a source nor a `meta.json` are passed over.
 
     Parameters
     ----------
@@ -44,7 +44,8 @@ class PairFolder(Dataset):
         self._ids = tuple(sorted(f.name for f in folder.iterdir() if _is_pair(f)))
         if not self.ids:
             raise FileNotFoundError(
-                f"{folder}: no pairs; each must be a folder {folder.name}/<id>/ with source.*, target.* and meta.json"
+                f"{folder}: no pairs; each must be a folder {folder.name}/<id>/ with source.*, target.* "
+                "and meta.json"
             )
         for name in self.ids:
             _files(folder / name)

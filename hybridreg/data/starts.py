@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The same pairs from other starts: sensors on one vehicle keep one pose, which a method may know by heart."""
+"""The same pairs from other starts: sensors on one vehicle keep one pose, which a method may have learnt."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ from hybridreg.pair import LabelledPair
 class YawStarts(Dataset):
     """Every pair as it is, and `n` times with its source turned about the sensor's z by a random angle.
 
-    Pairs are called `name` and `name@yaw1` to `name@yaw<n>`. The angle hangs on the seed, the name and the number
-    alone, so it is the same whatever other pairs there are.
+    Pairs are called `name` and `name@yaw1` to `name@yaw<n>`. The angle hangs on the seed, the name and the
+    number alone, so it is the same whatever other pairs there are.
     """
 
     def __init__(self, pairs: Sequence[LabelledPair], n: int = 3, seed: int = 0) -> None:

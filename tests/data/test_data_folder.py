@@ -43,7 +43,9 @@ def test_reads_pairs_in_the_order_of_their_names(root: Path) -> None:
     assert pairs[-1].pair.id == "c"
     assert [labelled.pair.id for labelled in pairs[1:]] == ["b", "c"]
     first = pairs[0]
-    assert np.allclose(se3.apply(first.T_target_source, first.pair.source.points), first.pair.target.points, atol=1e-5)
+    assert np.allclose(
+        se3.apply(first.T_target_source, first.pair.source.points), first.pair.target.points, atol=1e-5
+    )
     with pytest.raises(IndexError):
         _ = pairs[3]
 
@@ -79,13 +81,17 @@ def test_is_lazy_and_pickles_small(root: Path) -> None:
 @pytest.mark.parametrize("kind", ["source.npz", "target.xyz", "meta.json"])
 def test_says_what_is_missing_and_where(root: Path, kind: str) -> None:
     (root / "b" / kind).unlink()
-    with pytest.raises(FileNotFoundError, match=rf"pairs.b: {kind.split('.')[0]}.* missing; it must lie in that folder"):
+    with pytest.raises(
+        FileNotFoundError, match=rf"pairs.b: {kind.split('.')[0]}.* missing; it must lie in that folder"
+    ):
         # Without a source and a meta.json a folder is no pair at all.
         PairFolder(root)
 
 
 def test_a_folder_without_pairs_says_what_a_pair_is(tmp_path: Path) -> None:
-    with pytest.raises(FileNotFoundError, match=r"no pairs; each must be a folder .* with source\.\*, target\.\*"):
+    with pytest.raises(
+        FileNotFoundError, match=r"no pairs; each must be a folder .* with source\.\*, target\.\*"
+    ):
         PairFolder(tmp_path)
     with pytest.raises(FileNotFoundError, match="no such folder"):
         PairFolder(tmp_path / "nowhere")

@@ -28,7 +28,9 @@ def test_the_truth_turns_back(n: int, seed: int, offset: float) -> None:
     assert len(pairs) == n + 1
     for each in pairs:
         moved = se3.apply(each.T_target_source, each.pair.source.points + each.pair.source.offset)
-        assert np.allclose(moved, each.pair.target.points + each.pair.target.offset, atol=1e-5 if offset else 1e-9)
+        assert np.allclose(
+            moved, each.pair.target.points + each.pair.target.offset, atol=1e-5 if offset else 1e-9
+        )
 
 
 def test_names_and_what_stays() -> None:
@@ -40,7 +42,9 @@ def test_names_and_what_stays() -> None:
     assert np.array_equal(plain.pair.target.points, turned.pair.target.points)
     assert turned.pair.meta == {"kind": "made"}
     # About the sensor, so that heights and ranges stay.
-    assert np.allclose(np.linalg.norm(turned.pair.source.points, axis=1), np.linalg.norm(plain.pair.source.points, axis=1))
+    assert np.allclose(
+        np.linalg.norm(turned.pair.source.points, axis=1), np.linalg.norm(plain.pair.source.points, axis=1)
+    )
     assert np.array_equal(turned.pair.source.points[:, 2], plain.pair.source.points[:, 2])
     assert not turned.pair.source.points.flags.writeable
 

@@ -23,7 +23,7 @@ from hybridreg.scene import Level, Scene
 
 
 class Scattered(Dataset):
-    """`n` pairs whose target is the moved source, row by row; half of the source is out of the target's sight."""
+    """`n` pairs whose target is the moved source, row by row; it did not see half of the source."""
 
     def __init__(self, n: int = 4, broken: tuple[int, ...] = (), offset: float = 0.0) -> None:
         self.n, self.broken, self.offset = n, broken, offset
@@ -86,8 +86,8 @@ class RowByRow:
         confidence = float(np.random.default_rng(seed).uniform())
         return RegistrationResult(
             transformation=raise_pose(trace.refined.T, pair), verdict="ok", confidence=confidence,
-            reasons=("rows agree",), fitness=0.5, inlier_rmse=0.0, correspondence_set=np.zeros((0, 2), np.int64),
-            fitness_target=1.0, max_distance=0.1, information=np.eye(6), rivals=np.zeros((0, 4, 4)),
+            reasons=("rows agree",), fitness=0.5, inlier_rmse=0.0,
+            correspondence_set=np.zeros((0, 2), np.int64), fitness_target=1.0, max_distance=0.1, information=np.eye(6), rivals=np.zeros((0, 4, 4)),
             matches=raise_matches(trace.matches, pair), evidence={"violations": float("nan")}, notes=(),
             seconds=trace.seconds, peak_memory_mb=None, seed=seed, spec=self.to_spec(),
         )  # fmt: skip
@@ -95,7 +95,7 @@ class RowByRow:
 
 @dataclass(frozen=True, kw_only=True)
 class Moody:
-    """A plain callable: right, wrong, silent, broken or mad, by the pair's number; it may also take its time."""
+    """A plain callable: right, wrong, silent, broken or mad, by the pair's number; it may take its time."""
 
     moods: tuple[str, ...] = ("right", "raise", "none", "nan", "wrong")
     seconds: float = 0.0

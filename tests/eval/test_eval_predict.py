@@ -51,7 +51,7 @@ def test_every_failure_is_a_row(tmp_path: Path) -> None:
     rows = predict(Moody(), Scattered(6, broken=(5,)), tmp_path / "p.jsonl")
     right, raised, none, nan, wrong, lost = rows
     assert right.T is not None
-    assert wrong.T == np.eye(4).tolist()
+    assert np.array_equal(wrong.T, np.eye(4))
     assert raised.error == "RuntimeError: pair-1 is beyond me"
     assert (none.T, none.error, nan.T, nan.error) == (None, None, None, None)
     assert raised.T_true is not None
@@ -115,7 +115,7 @@ def test_a_broken_line_in_the_middle_is_named(tmp_path: Path) -> None:
     predict(RowByRow(), Scattered(3), path)
     lines = path.read_text().splitlines(keepends=True)
     path.write_text("".join([*lines[:2], '{"index": 1, "colour": "red"}\n', *lines[3:]]))
-    with pytest.raises(ValueError, match="line 3.*colour"):
+    with pytest.raises(ValueError, match=r"line 3.*colour"):
         read(path)
 
 
@@ -128,7 +128,9 @@ def test_a_broken_line_in_the_middle_is_named(tmp_path: Path) -> None:
         ({"data": "other"}, 'data.name: "" before, "other" now'),
     ],
 )
-def test_a_changed_configuration_is_refused_and_named(tmp_path: Path, change: dict[str, Any], told: str) -> None:
+def test_a_changed_configuration_is_refused_and_named(
+    tmp_path: Path, change: dict[str, Any], told: str
+) -> None:
     path = tmp_path / "p.jsonl"
     first = {"method": RowByRow(), "pairs": Scattered(2), "seed": 0, "data": ""}
 

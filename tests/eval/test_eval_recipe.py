@@ -87,7 +87,8 @@ def test_a_table_that_makes_no_sense_is_refused(table: dict[str, Any], told: str
 
 
 @pytest.mark.parametrize(
-    "table", [{"row": [{"preset": "icq"}]}, {"row": [{}], "protocols": ["kiti"]}, {"row": [{"refine": "gicq"}]}]
+    "table",
+    [{"row": [{"preset": "icq"}]}, {"row": [{}], "protocols": ["kiti"]}, {"row": [{"refine": "gicq"}]}],
 )
 def test_unknown_names_list_the_known(table: dict[str, Any]) -> None:
     with pytest.raises(KeyError, match="Known: "):
@@ -113,7 +114,8 @@ def test_the_shipped_table_holds_every_classical_preset() -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "file"), [("KISS + GICP", "kiss-gicp"), ("../x", "x"), ("°", "row"), ("a.b", "a.b"), ("..", "row")]
+    ("name", "file"),
+    [("KISS + GICP", "kiss-gicp"), ("../x", "x"), ("°", "row"), ("a.b", "a.b"), ("..", "row")],
 )
 def test_names_become_safe_file_names(name: str, file: str) -> None:
     assert recipe.slug(name) == file

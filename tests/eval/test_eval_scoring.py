@@ -26,7 +26,7 @@ def test_thresholds_are_the_published_ones() -> None:
 
 
 def test_unknown_protocol_lists_the_known() -> None:
-    with pytest.raises(KeyError, match="'kiti'.*cross3dreg, kitti"):
+    with pytest.raises(KeyError, match=r"'kiti'.*cross3dreg, kitti"):
         protocol("kiti")
 
 
@@ -69,7 +69,9 @@ def test_a_pair_that_could_not_be_read_counts_against_recall_only() -> None:
 
 def test_success_is_strict() -> None:
     exact = Protocol(name="x", rre_deg=2.0, rte_m=0.5, inlier_m=1.0, average="all", source="")
-    measured = errors.Errors(np.array([2.0, 1.0, 1.0]), np.array([0.1, 0.5, 0.1]), np.zeros(3), np.zeros(3, bool))
+    measured = errors.Errors(
+        np.array([2.0, 1.0, 1.0]), np.array([0.1, 0.5, 0.1]), np.zeros(3), np.zeros(3, bool)
+    )
     assert measured.success(exact).tolist() == [False, False, True]
 
 
@@ -114,7 +116,9 @@ def test_a_method_that_has_no_matches_at_one_pair_is_charged_for_it_once() -> No
 
 
 def test_a_method_without_matches_has_no_inlier_ratio() -> None:
-    assert np.isnan(score([row(0, 1, 1, inlier_ratio={"1": 0.0}, n_matches=0), row(1, 1, 1)], CROSS).inlier_ratio)
+    assert np.isnan(
+        score([row(0, 1, 1, inlier_ratio={"1": 0.0}, n_matches=0), row(1, 1, 1)], CROSS).inlier_ratio
+    )
 
 
 def test_no_rows_are_refused() -> None:
@@ -126,12 +130,13 @@ def test_no_rows_are_refused() -> None:
 def test_curves_rise_and_meet_the_recall(pairs: list[tuple[float, float]]) -> None:
     rows = [row(i, rre, rte) for i, (rre, rte) in enumerate(pairs)]
     measured = errors.of(rows)
-    for which, own in (("rre", KITTI.rre_deg), ("rte", KITTI.rte_m)):
-        curve = curves.sweep(measured, KITTI, which)  # type: ignore[arg-type]
+    recall = measured.success(KITTI).mean()
+    for curve, own in (
+        (curves.sweep(measured, KITTI, "rre"), KITTI.rre_deg),
+        (curves.sweep(measured, KITTI, "rte"), KITTI.rte_m),
+    ):
         assert np.all(np.diff(curve.recall) >= 0)
-        at = int(np.flatnonzero(np.isclose(curve.threshold, own))[0])
-        assert curve.recall[at] == pytest.approx(float(measured.within(own, KITTI.rte_m).mean()) if which == "rre"
-                                                 else float(measured.within(KITTI.rre_deg, own).mean()))  # fmt: skip
+        assert curve.recall[np.isclose(curve.threshold, own)].tolist() == [pytest.approx(recall)]
 
 
 def test_interval_holds_the_mean_and_is_repeatable() -> None:
@@ -140,7 +145,6 @@ def test_interval_holds_the_mean_and_is_repeatable() -> None:
     low, high = bootstrap.interval(values, names)
     assert 0.3 <= low < 0.7 < high <= 1.0
     assert bootstrap.interval(values, names) == (low, high)
-    assert bootstrap.interval(values, names, seed=1) != (low, high) or low == 0.4
 
 
 def test_turned_copies_do_not_narrow_the_interval() -> None:

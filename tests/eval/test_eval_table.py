@@ -100,8 +100,8 @@ def test_caption_names_data_starts_and_protocol(ran: tuple[Table, Path]) -> None
 def test_markdown_tells_all_that_was_promised(ran: tuple[Table, Path]) -> None:
     text = formats.markdown(ran[0], RECIPE.protocols)
     head = next(line for line in text.splitlines() if line.startswith("| method | recall %"))
-    for column in ("95 % interval", "RRE° all", "RTE m all", "RRE° ok", "RTE m ok", "RRE° median", "RTE m median",
-                   "inliers %", "no pose", "s a pair", "peak MB", "recall % unrefined"):  # fmt: skip
+    for column in ("95 % interval", "RRE° all", "RTE m all", "RRE° ok", "RTE m ok", "RRE° median",
+                   "RTE m median", "inliers %", "no pose", "s a pair", "peak MB", "recall % unrefined"):  # fmt: skip
         assert f"| {column} " in head
     widths = {line.count("|") for line in text.splitlines() if line.startswith("| ") and "moody" not in line}
     assert all(line.endswith(" |") for line in text.splitlines() if line.startswith("|")), widths
@@ -122,7 +122,10 @@ def test_the_criterion_average_has_its_own_columns() -> None:
 
 def test_verdicts_are_counted_against_success() -> None:
     words = ["ok", "ok", "doubtful", "failed"]
-    rows = [row(i, rre, 0.1, verdict=word) for i, (rre, word) in enumerate(zip((1, 50, 1, 50), words, strict=True))]
+    rows = [
+        row(i, rre, 0.1, verdict=word)
+        for i, (rre, word) in enumerate(zip((1, 50, 1, 50), words, strict=True))
+    ]
     judged = Table(title="t", data="d", seed=0, starts=0, entries=[Entry(name="m", rows=rows)])
     assert formats.tables(judged, KITTI)["Verdict against success"] == [
         {"method": "m", '"ok"': "1 right of 2", '"doubtful"': "1 right of 1", '"failed"': "0 right of 1"}
@@ -201,7 +204,9 @@ def test_the_page_holds_plotly_once_curves_and_views(written: Path) -> None:
     assert text.count("Plotly.newPlot(") == 2 * 3 + 8
     assert text.count(THREE_D) == 8 * 4, "each view: target, aligned, before, true"
     outside = text.replace(figures.script(), "")
-    assert set(re.findall(r"https?://[^\"' ]*", outside)) <= {"https://plot.ly"}, "only plotly's own setting, unused"
+    assert set(re.findall(r"https?://[^\"' ]*", outside)) <= {"https://plot.ly"}, (
+        "only plotly's own setting, unused"
+    )
 
 
 def test_the_list_of_pairs_is_data_for_the_filter(written: Path) -> None:
@@ -217,7 +222,9 @@ def test_the_list_of_pairs_is_data_for_the_filter(written: Path) -> None:
 def test_worst_pairs_take_turns_and_start_with_the_largest_error() -> None:
     entries = [
         Entry(name="a", rows=[row(0, 1, 0.1), row(1, 90, 0.1), dataclasses.replace(row(2, 0, 0), T=None)]),
-        Entry(name="b", rows=[row(0, 1, 9.0), row(1, 2, 0.1), Row(index=2, id="pair-2", error="OSError: gone")]),
+        Entry(
+            name="b", rows=[row(0, 1, 9.0), row(1, 2, 0.1), Row(index=2, id="pair-2", error="OSError: gone")]
+        ),
     ]
     both = Table(title="t", data="d", seed=0, starts=0, entries=entries)
     found = [(name, r.id) for name, r in report.worst(both, CROSS)]

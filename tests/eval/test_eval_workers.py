@@ -68,13 +68,17 @@ def test_one_thread_holds_inside_and_gives_back_after(monkeypatch: pytest.Monkey
 def cluster() -> Iterator[Any]:
     distributed = pytest.importorskip("distributed")
     with (
-        distributed.LocalCluster(n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None) as local,
+        distributed.LocalCluster(
+            n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None
+        ) as local,
         distributed.Client(local) as client,
     ):
         yield client
 
 
-def test_a_dask_cluster_gives_the_same_rows(tmp_path: Path, alone: list[dict[str, Any]], cluster: Any) -> None:
+def test_a_dask_cluster_gives_the_same_rows(
+    tmp_path: Path, alone: list[dict[str, Any]], cluster: Any
+) -> None:
     with joblib.parallel_config(backend="dask", wait_for_workers_timeout=30):
         rows = predict(RowByRow(slip=0.1), Scattered(N), tmp_path / "p.jsonl", seed=3)
     np.testing.assert_equal([row.timeless for row in rows], alone)
