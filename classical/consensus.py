@@ -14,9 +14,10 @@ from hybridreg.classical.svd import kabsch
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-# Residuals worked on at a time. Of 2^14 to 2^20 tried, 2^16 was fastest: float32, they fill half of a 512 kB cache.
+# Residuals worked on at a time: as float32 they fill half of a 512 kB cache.
 _CHUNK = 1 << 16
-# The expanded square cancels terms of the size of the extent's square; float32 keeps enough digits beyond this.
+# The expanded square cancels terms of the size of the extent's square. Where the threshold's square is larger
+# than this share of it, float32 keeps enough digits.
 _COARSE = 50.0 * float(np.finfo(np.float32).eps)
 _MOST_REFITS = 10
 
@@ -27,20 +28,21 @@ class Support(NamedTuple):
     T: Array  # (4, 4)
     inliers: Mask  # (K,)
     count: int
+    score: float  # the count, a match weighing less the larger its residual (MSAC, Torr and Zisserman 2000)
 
 
 class Consensus:
     """Matches against which poses are held.
 
     The square of a residual, `|R p + t - q|^2`, is linear in 17 products of the match's coordinates, with
-    coefficients that only the pose knows. So the residuals of many poses are one matrix product, of which only the
-    sign of (square - threshold) is wanted.
+    coefficients that only the pose knows. So the residuals of many poses are one matrix product, of which
+    only the sign of (square - threshold) is wanted.
 
     Parameters
     ----------
     source, target : (K, 3)
     weight : (K,)
-        Weighs matches in refits; counting is unweighted.
+        Weighs matches in refits; counts are unweighted.
     max_distance : float
         Metres; a match agrees when its residual is smaller.
     """
@@ -74,33 +76,34 @@ class Consensus:
         t = T[:, :3, 3] + np.einsum("bij,j->bi", R, self._middle[0]) - self._middle[1]
         ones = np.ones((len(T), 1))
         constant = np.sum(t * t, axis=1, keepdims=True) - self.max_distance**2
-        return np.hstack([-2.0 * R.reshape(-1, 9), 2.0 * np.einsum("bij,bi->bj", R, t), -2.0 * t, ones, constant])
+        back = np.einsum("bij,bi->bj", R, t)
+        return np.hstack([-2.0 * R.reshape(-1, 9), 2.0 * back, -2.0 * t, ones, constant])
 
     def support(self, T: Array) -> Support:
         """Matches that agree with one pose, in full precision."""
         residual = np.einsum("ki,ji->kj", self.source, T[:3, :3]) + T[:3, 3] - self.target
-        inliers = np.einsum("ki,ki->k", residual, residual) < self.max_distance**2
-        return Support(T, inliers, int(np.count_nonzero(inliers)))
+        share = np.einsum("ki,ki->k", residual, residual) / self.max_distance**2
+        inliers = share < 1.0
+        return Support(T, inliers, int(np.count_nonzero(inliers)), float(np.sum(1.0 - share[inliers])))
 
     def refit(self, best: Support) -> Support:
-        """Fit to the matches that agree, again and again while more of them do (LO-RANSAC, Chum et al. 2003)."""
+        """Fit to the matches that agree, and again while they agree better (LO-RANSAC, Chum et al. 2003)."""
         for _ in range(_MOST_REFITS):
             rows = best.inliers
             T, status = kabsch(self.source[rows], self.target[rows], self.weight[rows])
             if status != "ok":
                 return best
             again = self.support(T)
-            if again.count <= best.count:
-                # As many agree: the fit to all of them is better than the one to a sample.
-                return again if again.count == best.count else best
+            if again.score <= best.score:
+                return best
             best = again
         return best
 
 
 def distances(poses: Array, T: Array, centre: Array) -> tuple[Array, Array]:
-    """How far poses (B, 4, 4) are from T (4, 4): degrees (B,), and metres (B,) by which they move `centre` (3,) apart.
+    """How far poses (B, 4, 4) are from T (4, 4): in degrees, and in metres between where they put `centre`.
 
-    The translation itself would depend on where the frame's origin lies.
+    The difference of translations would depend on where the frame's origin lies.
     """
     trace = np.einsum("bij,ij->b", poses[:, :3, :3], T[:3, :3])
     degrees = np.degrees(np.arccos(np.clip(0.5 * (trace - 1.0), -1.0, 1.0)))

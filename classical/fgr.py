@@ -28,8 +28,8 @@ class Fgr(Stage):
     Parameters
     ----------
     max_distance : float or None
-        Metres; residuals beyond it count for nothing at the end. None takes the scene's spacing. (Open3D's own
-        default, 0.025 of the cloud's diameter, means metres on a LiDAR scan.)
+        Metres; residuals beyond it count for little at the end. None takes the scene's spacing. (Open3D's own
+        default, 0.025 of the cloud's diameter, is metres on a LiDAR scan.)
     division_factor : float
         The basin shrinks by this factor every fourth iteration.
     iterations : int

@@ -43,8 +43,8 @@ class FpfhMatcher(Stage):
     mutual : bool
         Keep a match only where each point is the other's nearest.
     ratio : float in (0, 1] or None
-        Keep a match only where its distance is below this share of the distance to the second nearest. None keeps
-        all: on points a voxel apart the second nearest is often the next point of the same surface.
+        Keep a match only where its distance is below this share of the distance to the second nearest. None
+        keeps all: on points a voxel apart the second nearest is often the next point of the same surface.
     min_overlap : float in [0, 1]
         Points with a lower probability of overlap are left out, unless too few would remain.
     max_points : int
@@ -93,7 +93,7 @@ class FpfhMatcher(Stage):
         )
 
     def features(self, scene: Scene, side: Side) -> Array:
-        """Descriptors (n, 33) of a level's points, square roots of histograms; zero where there is no neighbour."""
+        """Descriptors (n, 33) of a level's points: roots of histograms, zero where there is no neighbour."""
         level: Level = getattr(scene, side)
         radius = self.radius or 5.0 * scene.spacing
         normals = surface(scene, side, self.normal_neighbours).normals
@@ -101,11 +101,11 @@ class FpfhMatcher(Stage):
         return scene.shared(key, lambda: _fpfh(level.points, normals, radius, self.max_neighbours))
 
     def _rows(self, scene: Scene, side: Side, features: Array, probability: Array) -> Indices:
-        # A descriptor of nothing but zeros belongs to a point without neighbours and equals all others of its kind.
+        # A descriptor of zeros belongs to a point without neighbours, and equals all others of its kind.
         described = features.any(axis=1)
         rows = np.flatnonzero(described & (probability > self.min_overlap))
         if len(rows) < min(_FEWEST, int(described.sum())):
-            scene.note(f"{len(rows)} points of the {side} lie in the overlap, too few to match: all points were used")
+            scene.note(f"only {len(rows)} points of the {side} lie in the overlap: FPFH matched all points")
             rows = np.flatnonzero(described)
         if len(rows) > self.max_points:
             scene.note(f"FPFH matched {self.max_points} of the {len(rows)} points of the {side} (max_points)")

@@ -27,15 +27,15 @@ def draw(n_samples: int, size: int, weight: Array, rng: np.random.Generator) -> 
 def rigid(samples: Indices, source: Array, target: Array, edge_ratio: float, shortest: float) -> Indices:
     """Samples whose edges are as long in the source as in the target.
 
-    Each edge is looked at in turn and only by the samples that passed those before: nine samples of ten stop at
-    the first, so that a pose is computed for few.
+    Each edge is looked at in turn and only for the samples that passed those before: nine samples of ten stop
+    at the first, so that a pose is computed for few.
 
     Parameters
     ----------
     edge_ratio : float in [0, 1]
         Shorter edge over longer edge must reach this.
     shortest : float
-        Metres; an edge no longer than this says nothing about the rotation. It also drops a match drawn twice.
+        Metres; an edge no longer than this says nothing about the rotation. Drops a match drawn twice, too.
     """
     for i, j in combinations(range(samples.shape[1]), 2):
         one = _square(source[samples[:, i]] - source[samples[:, j]])

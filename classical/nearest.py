@@ -20,7 +20,7 @@ class Nearest(NamedTuple):
     """For each source descriptor, its nearest target descriptor.
 
     index : (n,) int64, row of the target
-    distance, second : (n,) float64, to the nearest and to the next one; second is infinite for a single target
+    distance, second : (n,) float64, to the nearest and to the next one; infinite where there is no next
     mutual : (n,) bool, the nearest target has no source descriptor nearer than this one, and none as near
     """
 
@@ -33,10 +33,9 @@ class Nearest(NamedTuple):
 def nearest(source: Array, target: Array) -> Nearest:
     """Nearest neighbours by Euclidean distance, from every pairwise distance.
 
-    In 33 dimensions a tree visits most of its leaves: on 12.8k x 13.6k FPFH descriptors and one busy core this took
-    0.3 s both ways, scikit-learn's brute force 2.3 s, Open3D 2.4 s, scipy's KD-tree 2.6 s and OpenCV's matcher 3.0 s.
-    The squares are one float32 matrix product, of which blocks of rows stay in the cache: enough digits for
-    descriptors of like norms. One BLAS thread, so that the number of threads cannot decide a tie.
+    In 33 dimensions a tree visits most of its leaves, so this is brute force: the squared distances are one
+    float32 matrix product, made in blocks of rows that stay in the cache. One BLAS thread, so that the number
+    of threads cannot decide a tie. `benchmarks/nearest.py` holds it against four other libraries.
 
     Parameters
     ----------

@@ -35,14 +35,15 @@ class Ransac(Stage):
     iterations : int
         Most samples to draw.
     sample_size : int
-        Matches in a sample. Three fix a pose and are the likeliest to be all right; the papers' RANSAC-50K has 4.
+        Matches in a sample. Three fix a pose and are likeliest to be all right; the papers' RANSAC-50K has 4.
     max_distance : float or None
-        Metres; a match agrees with a pose when its residual is smaller. None takes 1.5 times the scene's spacing.
+        Metres; a match agrees with a pose when its residual is smaller. None takes 1.5 times the scene's
+        spacing.
     edge_ratio : float in [0, 1]
-        A sample's edges may differ in length between the clouds by this factor at most. 0 lets all through.
+        The shorter of an edge's two lengths over the longer must reach this. 0 lets all samples through.
     confidence : float in [0, 1]
-        Stop when a sample of right matches only has been drawn with this probability, were the best support the
-        true one. 1 draws all samples.
+        Stop when a sample of right matches only has been drawn with this probability, were the best support
+        the true one. 1 draws all samples.
     local_optimisation : bool
         Refit the best poses to the matches that agree with them.
     max_matches : int
@@ -50,7 +51,7 @@ class Ransac(Stage):
     rival_share : float in [0, 1]
         A pose far from the best one is a rival when its support is at least this share of the best one's.
     backend : "own" or "open3d"
-        Open3D's code shares one generator among its threads, so its results need not repeat; it finds no rivals.
+        Open3D's code shares one generator among its threads: its results need not repeat. It finds no rivals.
     """
 
     iterations: int = 50_000
@@ -71,7 +72,9 @@ class Ransac(Stage):
         if self.sample_size < 3:
             raise ValueError(f"sample_size={self.sample_size} must be at least 3: fewer matches fix no pose")
         if self.max_matches < self.sample_size:
-            raise ValueError(f"max_matches={self.max_matches} must be at least sample_size={self.sample_size}")
+            raise ValueError(
+                f"max_matches={self.max_matches} must be at least sample_size={self.sample_size}"
+            )
         if self.max_distance is not None and not self.max_distance > 0.0:
             raise ValueError(f"max_distance={self.max_distance} must be a positive length in metres")
         for name in ("edge_ratio", "confidence", "rival_share"):
@@ -112,12 +115,13 @@ class Ransac(Stage):
     def _search(self, consensus: Consensus, rng: np.random.Generator) -> list[Array]:
         """Poses, best first."""
         size = min(self.sample_size, len(consensus))
-        # The fit to all matches: right where there are no outliers, and where no sample is wider than the noise.
+        # The fit to all matches: right where there are no outliers, or where no sample is wider than the noise.
         T, status = kabsch(consensus.source, consensus.target, consensus.weight)
         poses, counts = [T[None]], [consensus.counts(T[None])]
         if status != "ok":
             counts[0][:] = 0
-        best, drawn, wanted = int(counts[0][0]), 0, float(self.iterations)
+        best, drawn = int(counts[0][0]), 0
+        wanted = self._wanted(best / len(consensus), size)
         while drawn < wanted:
             n = min(_BATCH, self.iterations - drawn)
             poses.append(self._draw(consensus, n, size, rng))
@@ -125,12 +129,16 @@ class Ransac(Stage):
             drawn += n
             if counts[-1].max(initial=0) > best:
                 best = self._optimised(consensus, poses[-1][int(counts[-1].argmax())])
-                wanted = min(self.iterations, self._wanted(best / len(consensus), size))
+                wanted = self._wanted(best / len(consensus), size)
         all_counts = np.concatenate(counts)
         if all_counts.max() < 3:
             return []
         found = modes(
-            consensus, np.concatenate(poses), all_counts, refit=self.local_optimisation, share=self.rival_share
+            consensus,
+            np.concatenate(poses),
+            all_counts,
+            refit=self.local_optimisation,
+            share=self.rival_share,
         )
         return [one.T for one in found]
 
@@ -146,7 +154,8 @@ class Ransac(Stage):
 
     def _wanted(self, inlier_ratio: float, size: int) -> float:
         # Samples after which one without outliers was drawn with the wanted confidence.
-        right = min(inlier_ratio, 1.0) ** size
+        right = inlier_ratio**size
         if self.confidence >= 1.0 or right <= 0.0:
-            return math.inf
-        return math.log(1.0 - self.confidence) / math.log1p(-right) if right < 1.0 else 0.0
+            return self.iterations
+        enough = math.log(1.0 - self.confidence) / math.log1p(-right) if right < 1.0 else 0.0
+        return min(enough, self.iterations)

@@ -16,7 +16,9 @@ _SAME_DEG, _SAME_DISTANCES = 5.0, 4.0
 _MOST_MODES = 8
 
 
-def modes(consensus: Consensus, poses: Array, counts: NDArray[np.int64], *, refit: bool, share: float) -> list[Support]:
+def modes(
+    consensus: Consensus, poses: Array, counts: NDArray[np.int64], *, refit: bool, share: float
+) -> list[Support]:
     """Distinct poses, best first, each refitted: non-maximum suppression over hypotheses.
 
     Parameters
@@ -33,11 +35,13 @@ def modes(consensus: Consensus, poses: Array, counts: NDArray[np.int64], *, refi
     while len(left) and len(found) < _MOST_MODES and counts[left[0]] >= 0.5 * share * max(counts.max(), 1):
         seed = consensus.support(poses[left[0]])
         found.append(consensus.refit(seed) if refit else seed)
-        near = _same(poses[left], seed.T, centre, consensus) | _same(poses[left], found[-1].T, centre, consensus)
+        near = _same(poses[left], seed.T, centre, consensus) | _same(
+            poses[left], found[-1].T, centre, consensus
+        )
         near[0] = True
         left = left[~near]
-    found.sort(key=lambda one: -one.count)
-    return _distinct([one for one in found if one.count >= share * found[0].count], centre, consensus)
+    found.sort(key=lambda one: -one.score)
+    return _distinct([one for one in found if one.score >= share * found[0].score], centre, consensus)
 
 
 def _distinct(found: list[Support], centre: Array, consensus: Consensus) -> list[Support]:

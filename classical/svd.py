@@ -37,7 +37,7 @@ class Fits(NamedTuple):
 
 
 def kabsch(source: Array, target: Array, weight: Array | None = None) -> tuple[Array, Status]:
-    """Rotation and translation that minimise `sum w |R p + t - q|^2` (Kabsch 1976, Umeyama 1991 without scale).
+    """Rotation and translation that minimise `sum w |R p + t - q|^2` (Kabsch 1976).
 
     Parameters
     ----------
@@ -47,8 +47,8 @@ def kabsch(source: Array, target: Array, weight: Array | None = None) -> tuple[A
     Returns
     -------
     T : (4, 4)
-    status : "ok"; "degenerate" for points on one line, where T is one of many best motions; "few" for less than
-        3 matches or no weight, and "nan" for numbers that are not finite, where T is the identity
+    status : "ok"; "degenerate" for points on one line, where T is one of many best motions; "few" for less
+        than 3 matches or no weight, and "nan" for numbers that are not finite, where T is the identity
     """
     fits = kabsch_batch(source[None], target[None], None if weight is None else weight[None])
     return fits.T[0], STATUSES[int(fits.status[0])]
@@ -60,7 +60,7 @@ def kabsch_batch(source: Array, target: Array, weight: Array | None = None) -> F
     n_fits, n = source.shape[:2]
     w = np.ones((n_fits, n)) if weight is None else np.asarray(weight, dtype=np.float64)
     total = w.sum(axis=1)
-    # Divided by the exact sum: GeoTransformer's sum + 1e-5 pulls the centroids of faint weights to the origin.
+    # Divided by the exact sum: GeoTransformer's sum + 1e-5 pulls centroids of faint weights to the origin.
     enough = (total >= 1e-8) & (n >= 3)
     w = w / np.where(enough, total, 1.0)[:, None]
     # einsum runs numpy's own loops, so that no BLAS thread count changes the last bit.
@@ -74,7 +74,7 @@ def kabsch_batch(source: Array, target: Array, weight: Array | None = None) -> F
     t = middle_target - np.einsum("bij,bj->bi", R, middle_source)
     T = np.where(usable[:, None, None], se3.from_rt(R, t), np.eye(4))
     thin = (spread[:, 1] <= _COLLINEAR * spread[:, 0]) | (spread[:, 0] <= _rounding(source, target))
-    status = np.where(finite, np.where(enough, np.where(thin, _DEGENERATE, _OK), _FEW), np.where(n < 3, _FEW, _NAN))
+    status = np.select([n < 3, ~finite, ~enough, thin], [_FEW, _NAN, _FEW, _DEGENERATE], default=_OK)
     return Fits(T, status.astype(np.int8))
 
 
@@ -95,13 +95,13 @@ def _rounding(source: Array, target: Array) -> Array:
 
 @dataclass(frozen=True, kw_only=True)
 class WeightedSvd(Stage):
-    """The best fit to all matches by their weights, with no defence against wrong ones (third row of Table 3).
+    """The best fit to all matches by their weights, with no defence against wrong ones.
 
     Parameters
     ----------
     max_distance : float or None
-        Metres; matches nearer than this under the pose are reported as inliers. None takes 1.5 times the scene's
-        spacing.
+        Metres; matches nearer than this under the pose are reported as inliers. None takes 1.5 times the
+        scene's spacing.
     """
 
     max_distance: float | None = None

@@ -27,14 +27,14 @@ def planted(
 
 
 def street(seed: int, n: int = 12_000) -> np.ndarray:
-    """A ground plane, house fronts that step back and forth, poles and boxes: points (n, 3), sensor at the origin."""
+    """Ground, house fronts that step back and forth, boxes: points (n, 3), the sensor at the origin."""
     rng = np.random.default_rng(seed)
     parts = [np.column_stack([rng.uniform(-25, 25, (n // 3, 2)), rng.normal(-1.8, 0.01, n // 3)])]
     for x in np.arange(-25.0, 25.0, 6.0):
         for side in (-1.0, 1.0):
             depth, height = side * rng.uniform(8, 14), rng.uniform(2, 9)
             front = rng.uniform([x, depth, -1.8], [x + 6, depth + 0.01, height], (n // 40, 3))
-            flank = rng.uniform([x, depth, -1.8], [x + 0.01, depth + side * 4, height], (n // 80, 3))
+            flank = [x, depth, -1.8] + rng.uniform(0, 1, (n // 80, 3)) * [0.01, 4 * side, height + 1.8]
             parts += [front, flank]
     for _ in range(14):
         corner = np.array([*rng.uniform(-20, 20, 2), -1.8])
