@@ -54,7 +54,7 @@ def write(
 
 def html(table: Table, protocols: Sequence[Protocol], pairs: Sequence[LabelledPair] | None = None) -> str:
     """The page: tables and curves of every protocol; pairs and views by the first of them."""
-    body = [page.heading(table.title, 1)]
+    body = [page.heading(table.title, 1), page.paragraph(formats.fine_print(table))]
     for protocol in protocols:
         body += _protocol_part(table, protocol)
     body += [page.heading("Every pair"), page.paragraph(f"By protocol {protocols[0].name}.")]

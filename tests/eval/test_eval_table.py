@@ -101,7 +101,8 @@ def test_markdown_tells_all_that_was_promised(ran: tuple[Table, Path]) -> None:
     text = formats.markdown(ran[0], RECIPE.protocols)
     head = next(line for line in text.splitlines() if line.startswith("| method | recall %"))
     for column in ("95 % interval", "RRE° all", "RTE m all", "RRE° ok", "RTE m ok", "RRE° median",
-                   "RTE m median", "inliers %", "no pose", "s a pair", "peak MB", "recall % unrefined"):  # fmt: skip
+                   "RTE m median", "inliers %", "no pose", "s a pair", "peak MB",
+                   "recall % unrefined"):  # fmt: skip
         assert f"| {column} " in head
     widths = {line.count("|") for line in text.splitlines() if line.startswith("| ") and "moody" not in line}
     assert all(line.endswith(" |") for line in text.splitlines() if line.startswith("|")), widths
