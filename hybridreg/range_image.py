@@ -24,6 +24,9 @@ _FINEST, _COARSEST = np.radians(0.5), np.radians(4.0)
 # Cells are as wide as the gaps between returns when doubling them covers less than this much more of the sky. It
 # would be 1 for a sharp-edged field of view with even rings; uneven rings and ragged edges add to it.
 _FILLED = 1.5
+# Of the returns of one sensor in one place at least this share is smooth (0.73 in the roughest real cloud, woods);
+# three scans of a street laid together came to 0.56.
+_LEAST_SMOOTH = 0.65
 _BITS = 12  # of a cell's index along one axis
 # Steeper than this a surface is seen edge-on, and how far a ray beside the point looks says nothing, degrees.
 _EDGE_ON_DEG = 75.0
@@ -86,6 +89,11 @@ class RangeImage:
         smoothness = _smoothness(tree, directions, reach)
         return cls(np.asarray(viewpoint, dtype=np.float64), directions, reach, resolution, smoothness, tree)
 
+    @property
+    def from_one_place(self) -> bool:
+        """Whether the returns can be those of one sensor at the viewpoint: else "looked through" means nothing."""
+        return self.smoothness >= _LEAST_SMOOTH
+
     def look(
         self, points: Array, normals: Array | None = None, *, margin: float, reach: float = np.inf, k: int = 4
     ) -> NDArray[np.int8]:
@@ -122,12 +130,6 @@ class RangeImage:
         free = ~(asked & (behind <= slack)).any(axis=1)
         state = np.where(seen, Seen.SEEN, np.where(free, Seen.FREE, Seen.HIDDEN))
         return np.where(asked.any(axis=1), state, Seen.UNSEEN).astype(np.int8)
-
-    def in_view(self, points: Array) -> NDArray[np.bool_]:
-        """Whether each point (m, 3) lies in a direction from which anything came back."""
-        ray = points - self.viewpoint
-        r = np.maximum(np.linalg.norm(ray, axis=1), 1e-9)
-        return np.isfinite(self.tree.query(ray / r[:, None], distance_upper_bound=1.5 * self.resolution, workers=-1)[0])
 
 
 def angular_resolution(directions: Array) -> float:

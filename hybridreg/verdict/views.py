@@ -24,9 +24,6 @@ _NEAR_ENOUGH = 1.5
 _MOST_POINTS = 20_000
 # Points that are asked about, spread evenly over the level: a share of 3,000 is good to one percent.
 _N_ASKED = 3_000
-# Of the range image: a cloud from several places, or one whose origin is not the sensor, mixes near and far in
-# one direction, and then "looked through" means nothing.
-_LEAST_SMOOTH = 0.6
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -42,9 +39,6 @@ class View:
         None where the sensor's place is not known.
     asked : (m,) int64
         Rows that are compared with the other cloud.
-    axis : (m,) int64
-        Which of the cloud's own main directions of normals each asked point faces: 0 the commonest (the ground,
-        mostly), 2 the rarest (in a street or a corridor, what faces along it).
     """
 
     points: Array
@@ -53,7 +47,6 @@ class View:
     tree: cKDTree
     image: RangeImage | None
     asked: NDArray[np.int64]
-    axis: NDArray[np.int64]
 
 
 def views(scene: Scene) -> tuple[View, View]:
@@ -87,7 +80,6 @@ def _view(scene: Scene, side: Side) -> View:
         tree=tree,
         image=_image(scene, side),
         asked=asked,
-        axis=_axis(surface.normals[asked]),
     )
 
 
@@ -97,9 +89,5 @@ def _image(scene: Scene, side: Side) -> RangeImage | None:
     if viewpoint is None:
         return None
     image = scene.shared(("range image", side), lambda: RangeImage.of(cloud.points, viewpoint))
-    return image if image.smoothness >= _LEAST_SMOOTH else None
+    return image if image.from_one_place else None
 
-
-def _axis(facing: Array) -> NDArray[np.int64]:
-    _, axes = np.linalg.eigh(facing.T @ facing)
-    return np.argmax(np.abs(facing @ axes[:, ::-1]), axis=1)
