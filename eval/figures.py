@@ -60,7 +60,7 @@ def confidence(rows: Mapping[str, Sequence[Row]], protocol: Protocol) -> Figure:
 
 
 def reliability(rows: Mapping[str, Sequence[Row]], protocol: Protocol) -> Figure:
-    """Share of successes among the pairs of like confidence; on the diagonal a confidence means what it says."""
+    """Share of successes among pairs of like confidence; on the diagonal it means what it says."""
     from plotly.graph_objects import Figure
 
     figure = Figure()
