@@ -14,7 +14,9 @@ from hybridreg.resources import n_threads
 @pytest.mark.parametrize(
     ("said", "n"), [("3", 3), ("4,2", 4), ("", -1), ("0", -1), ("all", -1), ("-2", -1), (None, -1)]
 )
-def test_trees_heed_the_variable_that_numpy_heeds(monkeypatch: pytest.MonkeyPatch, said: str | None, n: int) -> None:
+def test_trees_heed_the_variable_that_numpy_heeds(
+    monkeypatch: pytest.MonkeyPatch, said: str | None, n: int
+) -> None:
     if said is None:
         monkeypatch.delenv("OMP_NUM_THREADS", raising=False)
     else:
