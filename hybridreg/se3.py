@@ -41,13 +41,19 @@ def exp(twist: Array) -> Array:
 
 
 def rotation_about(vector: Array) -> Array:
-    """Rotation (3, 3) about a vector (3,) whose length is the angle in radians (Rodrigues)."""
-    angle = float(np.linalg.norm(vector))
-    K = skew(vector)
-    # The series of sin(a)/a and (1 - cos a)/a^2 near zero, where the quotients lose their digits.
-    if angle < 1e-6:
-        return project(np.eye(3) + K + 0.5 * K @ K)
-    return np.eye(3) + np.sin(angle) / angle * K + (1.0 - np.cos(angle)) / angle**2 * K @ K
+    """Rotation (3, 3) about a vector (3,) whose length is the angle in radians."""
+    from scipy.spatial.transform import Rotation
+
+    R: Array = Rotation.from_rotvec(vector).as_matrix()
+    return R
+
+
+def log_rotation(R: Array) -> Array:
+    """Vector (3,) in radians that `rotation_about` turns into R (3, 3); its length lies in [0, pi]."""
+    from scipy.spatial.transform import Rotation
+
+    vector: Array = Rotation.from_matrix(R).as_rotvec()
+    return vector
 
 
 def skew(v: Array) -> Array:
@@ -103,7 +109,9 @@ def check(T: Any, name: str = "T", tolerance: float = 1e-4) -> Array:
     if not np.isfinite(matrix).all():
         raise ValueError(f"{name}: the matrix is not finite")
     if not np.allclose(matrix[3], [0, 0, 0, 1], atol=1e-9):
-        raise ValueError(f"{name}: the last row is {matrix[3]}, expected [0 0 0 1]; is the matrix transposed?")
+        raise ValueError(
+            f"{name}: the last row is {matrix[3]}, expected [0 0 0 1]; is the matrix transposed?"
+        )
     error = float(np.abs(matrix[:3, :3] @ matrix[:3, :3].T - np.eye(3)).max())
     if error > tolerance or np.linalg.det(matrix[:3, :3]) < 0:
         raise ValueError(
