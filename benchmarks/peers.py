@@ -59,7 +59,9 @@ def open3d_then_gicp(voxel: float) -> Method:
             down = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(cloud.points)).voxel_down_sample(voxel)
             down.estimate_normals(o3d.geometry.KDTreeSearchParamHybrid(2 * voxel, 30))
             clouds.append(down)
-            features.append(reg.compute_fpfh_feature(down, o3d.geometry.KDTreeSearchParamHybrid(5 * voxel, 100)))
+            features.append(
+                reg.compute_fpfh_feature(down, o3d.geometry.KDTreeSearchParamHybrid(5 * voxel, 100))
+            )
         o3d.utility.random.seed(zlib.crc32(labelled.pair.id.encode()) % 2**31)
         found = reg.registration_ransac_based_on_feature_matching(
             *clouds,
@@ -141,19 +143,25 @@ def summary(outcomes: list[Outcome], against: str) -> str:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--data", default="../shared/data/real")
     parser.add_argument("--starts", type=int, default=3, help="random yaw starts beside the pair as it is")
     parser.add_argument("--presets", nargs="*", default=["kiss-gicp", "fpfh-ransac-gicp"])
     parser.add_argument("--rows", type=Path, help="write one JSON line for each method and pair")
     options = parser.parse_args()
-    methods = {name: make() for name, make in PEERS.items()} | {name: preset(name) for name in options.presets}
+    methods = {name: make() for name, make in PEERS.items()} | {
+        name: preset(name) for name in options.presets
+    }
     outcomes = []
     for outcome in race(yaw_starts(open_dataset(options.data), options.starts), methods):
         outcomes.append(outcome)
         print(f"{outcome.pair:40s} {outcome.method:38s} {outcome.rre_deg:7.2f} {outcome.rte_m:7.2f} "
               f"{'ok' if outcome.success else '--'} {outcome.seconds:.2f} s", flush=True)  # fmt: skip
-    print(f"\n{len(outcomes) // len(methods)} starts of the pairs in {options.data}; success is 2 deg and 0.5 m\n")
+    print(
+        f"\n{len(outcomes) // len(methods)} starts of the pairs in {options.data}; success is 2 deg and 0.5 m\n"
+    )
     print(summary(outcomes, "kiss-matcher 0.5 + small_gicp"))
     if options.rows:
         options.rows.write_text("".join(json.dumps(dataclasses.asdict(o)) + "\n" for o in outcomes))

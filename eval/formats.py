@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from hybridreg.eval import columns
 from hybridreg.eval.columns import Cells
 from hybridreg.eval.protocols import Protocol
+from hybridreg.eval.scoring import scene_of
 from hybridreg.eval.table import Table
 
 _LATEX = {"\\": r"\textbackslash{}", "°": r"$^\circ$", "–": "--"} | {c: f"\\{c}" for c in "&%$#_{}"}
@@ -22,14 +23,22 @@ def markdown(table: Table, protocols: Sequence[Protocol]) -> str:
     parts = [f"# {table.title}"]
     for protocol in protocols:
         parts.append(f"## {protocol.name}\n\n{table.caption(protocol)} ({protocol.source}).")
-        parts.extend(markdown_table(lines) for lines in tables(table, protocol).values() if lines)
+        named = tables(table, protocol).items()
+        parts.extend(f"### {title}\n\n{markdown_table(lines)}" for title, lines in named if lines)
     parts.extend(f"Not run: {name}. {problem}" for name, problem in table.problems.items())
-    parts.append(
-        "Recall's interval is a bootstrap over scenes (a pair and its turned copies are drawn together). "
-        "A pair without a pose counts as the identity and never as a success. Seconds are wall time with one "
-        f"thread a pair; seed {table.seed}."
+    return "\n\n".join([*parts, fine_print(table)]) + "\n"
+
+
+def fine_print(table: Table) -> str:
+    """What every number of a table hangs on."""
+    scenes = {scene_of(row) for entry in table.entries for row in entry.rows}
+    return (
+        "Recall's interval is a 95 % bootstrap over scenes (a pair and its turned copies are drawn as one); "
+        f"one of no width says that all {len(scenes)} scenes agree, which still leaves room for "
+        f"{min(100.0, 300 / max(len(scenes), 1)):.0f} percentage points (the rule of three). A pair "
+        "without a pose counts as the identity and never as a success. Seconds are wall time, one thread a pair; "
+        f"seed {table.seed}."
     )
-    return "\n\n".join(parts) + "\n"
 
 
 def tables(table: Table, protocol: Protocol) -> dict[str, list[Cells]]:

@@ -54,7 +54,7 @@ def write(
 
 def html(table: Table, protocols: Sequence[Protocol], pairs: Sequence[LabelledPair] | None = None) -> str:
     """The page: tables and curves of every protocol; pairs and views by the first of them."""
-    body = [page.heading(table.title, 1)]
+    body = [page.heading(table.title, 1), page.paragraph(formats.fine_print(table))]
     for protocol in protocols:
         body += _protocol_part(table, protocol)
     body += [page.heading("Every pair"), page.paragraph(f"By protocol {protocols[0].name}.")]
@@ -77,7 +77,10 @@ def _protocol_part(table: Table, protocol: Protocol) -> Iterator[str]:
         if lines:
             yield page.heading(title, 3)
             yield page.html_table(lines)
-    plots = [*figures.recall_curves(rows, protocol), figures.confidence(rows, protocol)]
+    plots = figures.recall_curves(rows, protocol)
+    judged = {name: each for name, each in rows.items() if any(row.confidence is not None for row in each)}
+    if judged:
+        plots += [figures.reliability(judged, protocol), figures.confidence(judged, protocol)]
     yield f'<div class="curves">{"".join(f"<div>{figures.to_html(plot)}</div>" for plot in plots)}</div>'
 
 

@@ -90,7 +90,9 @@ class Pipeline(Stage):
         """A copy with some slots filled anew: `pipe.swap(estimate="ransac")`."""
         unknown = set(stages) - {*SLOTS, "voxel"}
         if unknown:
-            raise TypeError(f"no slot is called {', '.join(sorted(unknown))}; the slots are {', '.join(SLOTS)}")
+            raise TypeError(
+                f"no slot is called {', '.join(sorted(unknown))}; the slots are {', '.join(SLOTS)}"
+            )
         if "downsample" in stages:
             stages.setdefault("voxel", None)
         elif stages.get("voxel") is not None:

@@ -16,7 +16,9 @@ from hybridreg.stage import Stage
 
 
 def built_in() -> list[str]:
-    return [key for key in sorted(registry.BUILT_IN) if not registry.BUILT_IN[key].startswith("hybridreg.learned")]
+    return [
+        key for key in sorted(registry.BUILT_IN) if not registry.BUILT_IN[key].startswith("hybridreg.learned")
+    ]
 
 
 @pytest.mark.parametrize("key", built_in())

@@ -43,7 +43,9 @@ def _courtyard(rng: np.random.Generator, n: int) -> Array:
         u, v = rng.uniform(-0.5, 0.5, (2, n // 3))
         side = np.where(face % 2 == 0, 0.5, -0.5)
         x, y = np.where(face < 2, side, u), np.where(face < 2, u, side)
-        boxes.append(np.column_stack([centre[0] + size[0] * x, centre[1] + size[1] * y, size[2] * (v + 0.5) - 1.6]))
+        boxes.append(
+            np.column_stack([centre[0] + size[0] * x, centre[1] + size[1] * y, size[2] * (v + 0.5) - 1.6])
+        )
     return np.vstack(boxes)
 
 
@@ -56,4 +58,6 @@ def true_matches(scene: Scene, T: Array, n: int = 120) -> Correspondences:
     wrong = rng.random(n) < (0.2 if n > 1 else 0.0)
     target[wrong] += rng.uniform(-8.0, 8.0, (int(wrong.sum()), 3))
     nearest_corner = 4 * (source[:, 0] > 0) + 2 * (source[:, 1] > 0) + (source[:, 2] > -1.0)
-    return Correspondences(source=source, target=target, weight=np.ones(n), group=nearest_corner.astype(np.int64))
+    return Correspondences(
+        source=source, target=target, weight=np.ones(n), group=nearest_corner.astype(np.int64)
+    )

@@ -67,7 +67,9 @@ def slot_of(stage: Any) -> str:
 
     registered = name_of(stage)
     if registered is None:
-        raise ValueError(f"{type(stage).__name__} is not registered; say which slot it fills: {', '.join(SLOTS)}")
+        raise ValueError(
+            f"{type(stage).__name__} is not registered; say which slot it fills: {', '.join(SLOTS)}"
+        )
     return registered.partition(".")[0]
 
 
@@ -88,7 +90,9 @@ def check_pickle_and_clone(stage: Any, slot: str) -> None:
     if hasattr(stage, "get_params"):
         params = stage.get_params(deep=False)
         clone = type(stage)(**params)
-        assert all(clone.get_params(deep=False)[k] is v for k, v in params.items()), "parameters are not kept as given"
+        assert all(clone.get_params(deep=False)[k] is v for k, v in params.items()), (
+            "parameters are not kept as given"
+        )
 
 
 def check_output(stage: Any, slot: str) -> None:
@@ -110,7 +114,7 @@ def check_seed(stage: Any, slot: str) -> None:
 
 def check_permuted_points(stage: Any, slot: str) -> None:
     """The order of the points does not matter beyond the draw of random samples."""
-    scene, truth = sample_scene()
+    scene, _ = sample_scene()
     order = np.random.default_rng(1).permutation(len(scene.source))
     shuffled = Level(
         points=scene.source.points[order], spacing=scene.source.spacing, viewpoint=scene.source.viewpoint
@@ -118,12 +122,18 @@ def check_permuted_points(stage: Any, slot: str) -> None:
     other = Scene(pair=scene.pair, source=shuffled, target=scene.target)
     one, two = _run(stage, slot, scene), _run(stage, slot, other)
     if slot == "overlap":
-        assert np.allclose(one.source[order], two.source, atol=1e-6), "the source's overlap depends on the order"
+        assert np.allclose(one.source[order], two.source, atol=1e-6), (
+            "the source's overlap depends on the order"
+        )
     if slot == "match":
-        assert abs(len(one) - len(two)) <= 0.2 * max(len(one), 20), "the number of matches depends on the order"
+        assert abs(len(one) - len(two)) <= 0.2 * max(len(one), 20), (
+            "the number of matches depends on the order"
+        )
     if slot in ("estimate", "refine"):
         error = _error_m(one.T, two.T, scene)
-        assert error < 0.5 or not (one.found and two.found), f"the pose moves by {error:.2f} m with the order of points"
+        assert error < 0.5 or not (one.found and two.found), (
+            f"the pose moves by {error:.2f} m with the order of points"
+        )
 
 
 def check_rigid_motion(stage: Any, slot: str) -> None:
@@ -134,7 +144,10 @@ def check_rigid_motion(stage: Any, slot: str) -> None:
     motion = se3.from_rt(se3.rotation_about(np.array([0.0, 0.0, 1.0])), np.array([3.0, -2.0, 0.5]))
     matches = true_matches(scene, truth)
     moved = Correspondences(
-        source=se3.apply(motion, matches.source), target=matches.target, weight=matches.weight, group=matches.group
+        source=se3.apply(motion, matches.source),
+        target=matches.target,
+        weight=matches.weight,
+        group=matches.group,
     )
     level = Level(points=se3.apply(motion, scene.source.points), spacing=scene.source.spacing)
     one = stage(scene, matches, np.random.default_rng(0))
@@ -229,4 +242,6 @@ def _arrays(out: Any) -> list[Array]:
 
 
 def _error_m(A: Array, B: Array, scene: Scene) -> float:
-    return float(np.linalg.norm(se3.apply(A, scene.source.points) - se3.apply(B, scene.source.points), axis=1).mean())
+    return float(
+        np.linalg.norm(se3.apply(A, scene.source.points) - se3.apply(B, scene.source.points), axis=1).mean()
+    )

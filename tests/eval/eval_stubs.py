@@ -87,7 +87,8 @@ class RowByRow:
         return RegistrationResult(
             transformation=raise_pose(trace.refined.T, pair), verdict="ok", confidence=confidence,
             reasons=("rows agree",), fitness=0.5, inlier_rmse=0.0,
-            correspondence_set=np.zeros((0, 2), np.int64), fitness_target=1.0, max_distance=0.1, information=np.eye(6), rivals=np.zeros((0, 4, 4)),
+            correspondence_set=np.zeros((0, 2), np.int64), fitness_target=1.0,
+            max_distance=0.1, information=np.eye(6), rivals=np.zeros((0, 4, 4)),
             matches=raise_matches(trace.matches, pair), evidence={"violations": float("nan")}, notes=(),
             seconds=trace.seconds, peak_memory_mb=None, seed=seed, spec=self.to_spec(),
         )  # fmt: skip
