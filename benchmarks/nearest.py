@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Mutual nearest neighbours among FPFH descriptors: our blocks of a matrix product beside four libraries.
 
-A ratio below 1 means that ours is faster. "agree" is the share of a peer's mutual matches that ours finds too; equal
-descriptors, and float32, make it less than 1.
+A ratio below 1 means that ours is faster. "agree" is the share of a peer's mutual matches that ours has too;
+equal descriptors, and float32, make it less than 1.
 
     python -m benchmarks.nearest --data ../shared/data/real --pairs kitti-odo-5-to-0
 """
@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -83,9 +84,7 @@ def main() -> None:
         scene = hr.VoxelGrid()(labelled.pair)
         a, b = (hr.Fpfh().features(scene, side) for side in ("source", "target"))
         a, b = a[a.any(axis=1)], b[b.any(axis=1)]
-        runs = {
-            name: (lambda method=method: method(a, b)) for name, method in {"ours": ours, **PEERS}.items()
-        }
+        runs = {name: partial(method, a, b) for name, method in {"ours": ours, **PEERS}.items()}
         taken = seconds(runs, options.rounds)
         found = {tuple(row) for row in ours(a, b)}
         print(f"{labelled.pair.id}: {len(a)} x {len(b)}, ours {1e3 * taken['ours']:.0f} ms")

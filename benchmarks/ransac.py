@@ -3,8 +3,8 @@
 
 Both get the same FPFH matches, distance, edge ratio 0.9 and number of iterations; both drop samples whose own
 matches disagree with their pose (Open3D's distance checker). Open3D runs once as its users call it, on the
-downsampled clouds, and once on clouds that hold the matches alone, which spares it moving the rest. A ratio below 1
-means that ours is faster. "err" is the error of the pose found, as information.
+downsampled clouds, and once on clouds that hold the matches alone, which spares it moving the rest. A ratio
+below 1 means that ours is faster. "err" is the error of the pose found, as information.
 
     python -m benchmarks.ransac --data ../shared/data/real --pairs kitti-odo-5-to-0
 """

@@ -122,8 +122,9 @@ class Fpfh(Stage):
 
 def _fpfh(points: Array, normals: Array, radius: float, max_neighbours: int) -> Array:
     o3d = load_open3d()
-    cloud = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(points))
-    cloud.normals = o3d.utility.Vector3dVector(normals)
+    # Copies, because Open3D refuses arrays that are read-only, as a cloud's are.
+    cloud = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(points.copy()))
+    cloud.normals = o3d.utility.Vector3dVector(normals.copy())
     search = o3d.geometry.KDTreeSearchParamHybrid(radius, max_neighbours)
     histograms = np.asarray(o3d.pipelines.registration.compute_fpfh_feature(cloud, search).data).T
     return np.sqrt(np.maximum(np.nan_to_num(histograms), 0.0))

@@ -21,7 +21,7 @@ class Nearest(NamedTuple):
 
     index : (n,) int64, row of the target
     distance, second : (n,) float64, to the nearest and to the next one; infinite where there is no next
-    mutual : (n,) bool, the nearest target has no nearer source descriptor; each target has one such partner at most
+    mutual : (n,) bool, the nearest target has no nearer source descriptor; true once for each target at most
     """
 
     index: Indices

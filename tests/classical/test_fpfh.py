@@ -8,6 +8,7 @@ import pytest
 from made_matches import street
 from needs_open3d import needs_open3d
 
+import hybridreg as hr
 from hybridreg import se3
 from hybridreg.classical.fpfh import Fpfh
 from hybridreg.classical.ransac import Ransac
@@ -97,6 +98,14 @@ def test_points_without_neighbours_are_not_matched(make_scene: Callable[..., Sce
     far_apart[::2, 0] += 300.0
     scene = make_scene(far_apart, far_apart, voxel=0.1)
     assert len(Fpfh()(scene, full(scene))) == 0
+
+
+def test_takes_clouds_that_nothing_thinned(turned: Scene) -> None:
+    pair = turned.pair
+    points = (pair.source.points[::4], pair.target.points[::4])
+    scene = hr.AllPoints()(hr.Pair.of(*points))
+    assert not scene.source.points.flags.writeable
+    assert right(hr.Fpfh()(scene, full(scene))).sum() > 50
 
 
 def test_features_are_computed_once_a_run(turned: Scene) -> None:
