@@ -21,7 +21,7 @@ class Nearest(NamedTuple):
 
     index : (n,) int64, row of the target
     distance, second : (n,) float64, to the nearest and to the next one; infinite where there is no next
-    mutual : (n,) bool, the nearest target has no source descriptor nearer than this one, and none as near
+    mutual : (n,) bool, the nearest target has no nearer source descriptor; each target has one such partner at most
     """
 
     index: Indices

@@ -115,7 +115,7 @@ class Ransac(Stage):
     def _search(self, consensus: Consensus, rng: np.random.Generator) -> list[Array]:
         """Poses, best first."""
         size = min(self.sample_size, len(consensus))
-        # The fit to all matches: right where there are no outliers, or where no sample is wider than the noise.
+        # The fit to all matches: right where there are no outliers, or no sample is wider than the noise.
         T, status = kabsch(consensus.source, consensus.target, consensus.weight)
         poses, counts = [T[None]], [consensus.counts(T[None])]
         if status != "ok":

@@ -120,7 +120,7 @@ class RangeImage:
         r = np.maximum(np.sqrt(np.einsum("ni,ni->n", ray, ray)), 1e-9)
         k = min(k, len(self.ranges))
         angle, index = self.tree.query(
-            ray / r[:, None], k=np.arange(1, k + 1), distance_upper_bound=1.5 * self.resolution, workers=-1
+            ray / r[:, None], k=np.arange(1, k + 1), distance_upper_bound=1.5 * self.resolution
         )
         sideways = r[:, None] * angle
         asked = np.isfinite(angle) & (sideways <= reach)

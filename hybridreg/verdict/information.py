@@ -54,7 +54,11 @@ def measure(agreement: Agreement, target: View) -> Information:
     points, normals = way.moved[way.agrees], target.normals[way.match[way.agrees]]
     if len(points) == 0:
         return Information(
-            matrix=np.zeros((6, 6)), centre=np.zeros(3), weakest=0.0, turns=False, direction=np.array([1.0, 0.0, 0.0])
+            matrix=np.zeros((6, 6)),
+            centre=np.zeros(3),
+            weakest=0.0,
+            turns=False,
+            direction=np.array([1.0, 0.0, 0.0]),
         )
     centre = points.mean(axis=0)
     J = jacobian(points - centre, normals)

@@ -38,7 +38,13 @@ def support(agreement: Agreement) -> float:
 
 
 def find(
-    source: View, target: View, T: Array, agreement: Agreement, information: Information, offered: Array, spacing: float
+    source: View,
+    target: View,
+    T: Array,
+    agreement: Agreement,
+    information: Information,
+    offered: Array,
+    spacing: float,
 ) -> list[Rival]:
     """Settled rivals of pose T, the best supported first.
 
@@ -49,7 +55,11 @@ def find(
     """
     from hybridreg.verdict.settle import settle
 
-    guesses = [*offered[:_OFFERED], *_turned(source, target, T, agreement, information), *_slid(T, agreement, spacing)]
+    guesses = [
+        *offered[:_OFFERED],
+        *_turned(source, target, T, agreement, information),
+        *_slid(T, agreement, spacing),
+    ]
     guesses = [guess for guess in guesses if _differs(guess, T, information.centre, spacing)]
     promising = sorted(guesses, key=lambda G: -support(compare(source, target, G, spacing, every=_QUICK)))
     settled = [settle(source, target, G, spacing) for G in promising[:_CLOSELY]]
@@ -61,15 +71,19 @@ def find(
     return sorted(found, key=lambda rival: -rival.support)
 
 
-def _turned(source: View, target: View, T: Array, agreement: Agreement, information: Information) -> list[Array]:
-    # Half a turn about the axis that most surfaces face (the vertical, where there is ground), through the centre
-    # of the overlap; and again so that the middles of both clouds meet, which is where a symmetric room repeats.
-    axis = agreement.axes[0]
-    half = se3.rotation_about(np.pi * axis)
-    about = se3.from_rt(half, information.centre - half @ information.centre) @ T
-    aside = np.eye(3) - np.outer(axis, axis)
-    gap = aside @ (_middle(target.points, agreement.axes) - _middle(se3.apply(about, source.points), agreement.axes))
-    return [about, se3.from_rt(np.eye(3), gap) @ about]
+def _turned(
+    source: View, target: View, T: Array, agreement: Agreement, information: Information
+) -> list[Array]:
+    # Half a turn through the centre of the overlap about the axis that most surfaces face (the vertical, where there
+    # is ground); and about each axis so that the middles of both clouds meet, which is where a room repeats.
+    axes, centre = agreement.axes, information.centre
+    about = [
+        se3.from_rt(half, centre - half @ centre) @ T
+        for half in (se3.rotation_about(np.pi * axis) for axis in axes)
+    ]
+    middle = _middle(target.points, axes)
+    met = [se3.from_rt(np.eye(3), middle - _middle(se3.apply(G, source.points), axes)) @ G for G in about]
+    return [about[0], *met]
 
 
 def _middle(points: Array, axes: Array) -> Array:

@@ -22,7 +22,7 @@ def settle(source: View, target: View, T: Array, spacing: float, every: int = 3)
     rows = source.asked[::every]
     for step in _STEPS:
         moved = se3.apply(T, source.points[rows])
-        distance, match = target.tree.query(moved, distance_upper_bound=step * spacing, workers=-1)
+        distance, match = target.tree.query(moved, distance_upper_bound=step * spacing)
         hit = np.isfinite(distance)
         if np.count_nonzero(hit) < _FEWEST:
             return T

@@ -90,4 +90,3 @@ def _image(scene: Scene, side: Side) -> RangeImage | None:
         return None
     image = scene.shared(("range image", side), lambda: RangeImage.of(cloud.points, viewpoint))
     return image if image.from_one_place else None
-

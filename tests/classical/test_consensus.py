@@ -83,7 +83,7 @@ def test_draw_follows_the_weights() -> None:
 
 
 def test_distances_are_measured_where_the_points_are() -> None:
-    # Turned by 3 degrees about a centre a kilometre off: the translations differ by 52 m, the points by nothing.
+    # A turn by 3 degrees about a centre a kilometre off: a translation of 52 m, and the points stay.
     centre = np.array([1000.0, 0.0, 0.0])
     turn = se3.from_rt(np.eye(3), centre) @ se3.yaw(3.0) @ se3.from_rt(np.eye(3), -centre)
     degrees, metres = distances(turn[None], np.eye(4), centre)

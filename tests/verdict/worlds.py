@@ -43,7 +43,9 @@ def street(rng: np.random.Generator, crossing: bool = False) -> World:
             x += width + gap
         for x in np.arange(-65, 65, rng.uniform(6, 12)):
             if rng.random() < 0.6:
-                world.box(x + rng.uniform(-1, 1), side * rng.uniform(4, 5.5), (4.3, 1.8, 1.5), rng.normal(0, 0.05))
+                world.box(
+                    x + rng.uniform(-1, 1), side * rng.uniform(4, 5.5), (4.3, 1.8, 1.5), rng.normal(0, 0.05)
+                )
         for x in np.arange(-60, 60, rng.uniform(12, 22)):
             world.posts.append((x + rng.uniform(-2, 2), side * 6.5, 0.15, 7.0))
             if rng.random() < 0.5:
@@ -118,7 +120,9 @@ def rays(sensor: str, density: float, rng: np.random.Generator) -> Array:
     elif sensor == "raster":
         e, a = (
             g.ravel()
-            for g in np.meshgrid(np.radians(np.linspace(-12.5, 12.5, 100)), np.radians(np.linspace(-60, 60, 300)))
+            for g in np.meshgrid(
+                np.radians(np.linspace(-12.5, 12.5, 100)), np.radians(np.linspace(-60, 60, 300))
+            )
         )
     elif sensor == "rosette":
         t = np.linspace(0, 1, int(24_000 * density)) + rng.random()
