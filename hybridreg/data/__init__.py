@@ -1,0 +1,2 @@
+# SPDX-License-Identifier: MIT
+"""Datasets: the simulator and the loaders."""
