@@ -102,7 +102,7 @@ def _panes(vertices: np.ndarray, faces: np.ndarray, tint: np.ndarray, rng: np.ra
     covered = rng.random(len(faces)) < 0.35
     return [
         Mesh.of(vertices, faces[~covered].reshape(-1, 3), "glass", tint),
-        Mesh.of(vertices, faces[covered].reshape(-1, 3), "plaster", tuple(rng.uniform(0.5, 0.9, 3))),
+        Mesh.of(vertices, faces[covered].reshape(-1, 3), "plaster", (rng.uniform(0.55, 0.9) * np.array([1.0, 0.97, 0.92]))),
     ]
 
 

@@ -25,14 +25,18 @@ class Carrier:
 
 def draw_carrier(rng: np.random.Generator) -> Carrier:
     """A car with the sensor on its roof, a small robot, or a person with a backpack or tripod."""
-    kind = rng.choice(3, p=[0.5, 0.3, 0.2])
-    if kind == 0:
+    return carrier_named(str(rng.choice(["car", "robot", "person"], p=[0.5, 0.3, 0.2])), rng)
+
+
+def carrier_named(kind: str, rng: np.random.Generator) -> Carrier:
+    """A carrier of one kind: "car", "robot" or "person"."""
+    if kind == "car":
         shape = str(rng.choice(["hatchback", "estate", "suv"]))
         lift = rng.uniform(0.22, 0.5)
         rack = boxes(np.array([[0, 0, 1.5]]), np.array([0.25, 0.25, 0.2]), 0.0, "metal", (0.2, 0.2, 0.2))
         body = Mesh.merge([car(rng, shape).moved(0.0, (0.4, 0, 0)), rack])
         return Carrier(body, SHAPES[shape].size[2] * 1.05 + lift, 1.6)
-    if kind == 1:
+    if kind == "robot":
         height = rng.uniform(0.7, 1.3)
         chassis = boxes(np.array([[-0.1, 0, 0.15]]), np.array([0.9, 0.6, 0.35]), 0.0, "paint", (0.6, 0.5, 0.1))
         mast = tubes(np.array([[-0.05, 0, 0.4]]), np.array([[-0.05, 0, height - 0.12]]), 0.04, 0.04, "metal", (0.3,) * 3)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from hybridreg import se3
 
 from .camera import Camera, photograph
-from .caster import World, make_caster
+from .caster import Caster, World, make_caster
 from .layout import Layout
 from .light import Light
 from .mesh import Mesh
@@ -84,13 +84,19 @@ def draw(tier: str, number: int, source: Sensor | None = None, target: Sensor | 
     return best[1]
 
 
-def _world(layout: Layout, still: tuple, moving: list[Mesh]) -> World:
+def _world(still: tuple[Mesh, Caster], moving: list[Mesh]) -> World:
     movers = Mesh.merge(moving)
     return World([still, (movers, make_caster(movers))] if len(movers.faces) else [still])
 
 
 def _body(layout: Layout, stand: Stand) -> Mesh:
     return layout.on_ground(stand.carrier.body, stand.xy, stand.yaw)
+
+
+def world_with(layout: Layout, stand: Stand) -> World:
+    """The scene at the source's moment with one sensor's carrier in it."""
+    ground = Mesh.merge(layout.still)
+    return _world((ground, make_caster(ground)), [*layout.at_source, _body(layout, stand)])
 
 
 def _common(tier: Tier, sensors: tuple[Sensor, Sensor], streams: _Streams) -> Drawn:
@@ -101,8 +107,8 @@ def _common(tier: Tier, sensors: tuple[Sensor, Sensor], streams: _Streams) -> Dr
     stands = choose_stands(layout, World([still]), tier, sensors, streams.stands)
     bodies = [_body(layout, stand) for stand in stands]
     together = streams.stands.random() < 0.3  # two vehicles at a time, else one that comes back
-    at_source = _world(layout, still, layout.at_source + (bodies if together else bodies[:1]))
-    at_target = _world(layout, still, layout.at_target + (bodies if together else bodies[1:]))
+    at_source = _world(still, layout.at_source + (bodies if together else bodies[:1]))
+    at_target = _world(still, layout.at_target + (bodies if together else bodies[1:]))
     T_world_source, T_world_target = (stand.T_world_sensor for stand in stands)
     source = scan(at_source, layout.surface, sensors[0], T_world_source, streams.source)
     target = scan(at_target, layout.surface, sensors[1], T_world_target, streams.target)
@@ -119,8 +125,7 @@ def _disjoint(tier: Tier, sensors: tuple[Sensor, Sensor], streams: _Streams) -> 
     for k, rng in enumerate((streams.source, streams.target)):
         layout = SCENES[kind](streams.scene)
         stand = single_stand(layout, streams.stands)
-        ground = Mesh.merge(layout.still)
-        world = _world(layout, (ground, make_caster(ground)), [*layout.at_source, _body(layout, stand)])
+        world = world_with(layout, stand)
         scans.append(scan(world, layout.surface, sensors[k], stand.T_world_sensor, rng))
         poses.append(stand.T_world_sensor)
         if k == 0:

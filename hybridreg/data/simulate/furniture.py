@@ -11,6 +11,12 @@ from .solids import boxes, cards, quads, tubes
 GREY = (0.45, 0.46, 0.47)
 
 
+def muted(rng: np.random.Generator, strength: float = 0.45) -> np.ndarray:
+    """A colour (3,) as painted metal, cloth or plaster has it: a grey with a leaning."""
+    leaning = rng.dirichlet(np.ones(3)) * 3 - 1
+    return np.clip(rng.uniform(0.12, 0.75) * (1 + strength * leaning), 0.03, 0.95)
+
+
 def lamp(rng: np.random.Generator) -> Mesh:
     """A street lamp, its arm towards +x."""
     h, arm = rng.uniform(4.5, 9.0), rng.uniform(0.4, 2.0)
@@ -37,7 +43,7 @@ def sign(rng: np.random.Generator) -> Mesh:
 def billboard(rng: np.random.Generator) -> Mesh:
     """An advertising panel, a bus stop's wall or a notice board along y."""
     w, h, lift = rng.uniform(1.2, 4.0), rng.uniform(1.2, 2.6), rng.uniform(0.2, 1.2)
-    panel = boxes(np.array([[0, 0, lift]]), np.array([0.12, w, h]), 0.0, "plaster", rng.uniform(0.2, 0.9, 3))
+    panel = boxes(np.array([[0, 0, lift]]), np.array([0.12, w, h]), 0.0, "plaster", muted(rng, 0.9))
     y = np.array([-0.42, 0.42]) * w
     legs = np.c_[np.zeros(2), y, np.zeros(2)]
     return Mesh.merge([panel, tubes(legs, legs + [0, 0, lift + h], 0.05, 0.05, "metal", GREY)])
@@ -104,12 +110,12 @@ def bench(rng: np.random.Generator) -> Mesh:
 def bin_or_cabinet(rng: np.random.Generator) -> Mesh:
     """A litter bin, a wheelie bin, a switch cabinet or a letter box."""
     size = rng.uniform([0.4, 0.4, 0.7], [0.9, 1.4, 1.5])
-    return boxes(np.zeros((1, 3)), size, 0.0, "metal", rng.uniform(0.1, 0.6, 3))
+    return boxes(np.zeros((1, 3)), size, 0.0, "metal", muted(rng))
 
 
 def container(rng: np.random.Generator) -> Mesh:
     """A shipping container along x with ribbed sides."""
-    length, tint = float(rng.choice([6.06, 12.19])), rng.uniform(0.1, 0.7, 3)
+    length, tint = float(rng.choice([6.06, 12.19])), muted(rng, 0.9)
     body = boxes(np.zeros((1, 3)), np.array([length, 2.4, 2.59]), 0.0, "metal", tint)
     x = np.arange(-length / 2 + 0.2, length / 2, 0.55)
     ribs = np.concatenate([np.c_[x, np.full(len(x), s), np.full(len(x), 0.1)] for s in (-1.22, 1.22)])

@@ -11,7 +11,7 @@ from .mesh import Mesh
 
 EXTENT = 130.0  # metres from the centre to the rim of every scene
 _AXIS = np.concatenate(
-    [np.arange(-EXTENT, -48, 7.0), np.arange(-48, 48.1, 1.6), np.arange(EXTENT, 48, -7.0)[::-1]]
+    [np.arange(-EXTENT, -42, 8.0), np.arange(-42, 42.1, 2.0), np.arange(EXTENT, 42, -8.0)[::-1]]
 )
 
 

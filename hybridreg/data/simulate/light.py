@@ -47,7 +47,7 @@ class Light:
             rng.uniform(0.75, 1.3),
             1 + rng.normal(0, 0.04, 3),
             rng.uniform(0.02, 0.14),
-            rng.uniform(0.006, 0.025),
+            float(np.exp(rng.uniform(np.log(0.003), np.log(0.018)))),
         )
 
     def sky(self, rays: np.ndarray) -> np.ndarray:

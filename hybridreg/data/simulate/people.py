@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from .furniture import muted
 from .mesh import Mesh
 from .solids import ellipsoid, tubes
 
@@ -14,7 +15,7 @@ def person(rng: np.random.Generator) -> Mesh:
     h = float(np.clip(rng.normal(1.7, 0.14), 1.2, 1.95))
     step, swing = rng.uniform(-0.18, 0.18) * h, rng.uniform(-0.15, 0.15) * h
     hip, shoulder = 0.48 * h, 0.81 * h
-    coat, trousers = rng.uniform(0.05, 0.85, 3), rng.uniform(0.05, 0.5, 3)
+    coat, trousers = muted(rng, 0.7), 0.6 * muted(rng)
     legs = tubes(
         np.array([[0, -0.09, hip], [0, 0.09, hip]]), np.array([[step, -0.1, 0], [-step, 0.1, 0]]),
         0.085, 0.055, "cloth", trousers,
@@ -31,7 +32,7 @@ def person(rng: np.random.Generator) -> Mesh:
 
 def bicycle(rng: np.random.Generator, with_rider: bool) -> Mesh:
     """A bicycle along x, with or without somebody on it."""
-    tint = rng.uniform(0.1, 0.7, 3)
+    tint = muted(rng)
     turn = np.linspace(0, 2 * np.pi, 11)
     rim = np.c_[0.33 * np.cos(turn), np.zeros(11), 0.34 + 0.33 * np.sin(turn)]
     wheels = [

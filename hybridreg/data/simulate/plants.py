@@ -66,7 +66,7 @@ def _crown(
         clump = rng.integers(len(tips), size=leaves)
         width = rng.uniform(0.05, 0.13, len(tips))[clump, None] * height * (0.6 if kind == "tall" else 1.0)
         centres = tips[clump] + rng.normal(0, 0.65, (leaves, 3)) * width * [1, 1, 0.8]
-    size = 0.055 * height * np.sqrt(420 / leaves) * rng.uniform(0.6, 1.3, leaves)
+    size = 0.045 * height * np.sqrt(420 / leaves) * rng.uniform(0.6, 1.3, leaves)
     return cards(centres, size, rng, "leaves", tint)
 
 
@@ -75,7 +75,7 @@ def bush(rng: np.random.Generator, leaves: int = 90) -> Mesh:
     width, height = rng.uniform(0.4, 1.3), rng.uniform(0.3, 1.6)
     offset = rng.normal(0, 0.5, (leaves, 3)) * [width, width, 0.45 * height] + [0, 0, 0.45 * height]
     offset[:, 2] = np.abs(offset[:, 2])
-    return cards(offset, rng.uniform(0.08, 0.28, leaves), rng, "leaves", _GREENS[rng.integers(5)])
+    return cards(offset, rng.uniform(0.06, 0.18, leaves), rng, "leaves", _GREENS[rng.integers(5)] * rng.uniform(0.7, 1.2))
 
 
 def hedge(rng: np.random.Generator, length: float) -> Mesh:

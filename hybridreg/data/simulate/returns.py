@@ -6,11 +6,13 @@ from __future__ import annotations
 import numpy as np
 
 from .caster import Hits
-from .materials import LOST, REFLECTIVITY, ROUGHNESS
+from .materials import LOST, MATERIAL_INDEX, REFLECTIVITY, ROUGHNESS
 from .sensors import Sensor
 
 STRAY_SHARE = 0.0004
+INSIDE_SHARE = 0.35  # of the pulses that pass a pane: they come back from the room or the seats behind it
 MIXED_SHARE = 0.3  # of pulses at an edge
+GLASS = MATERIAL_INDEX["glass"]
 
 
 def measured_ranges(sensor: Sensor, directions: np.ndarray, hits: Hits, rng: np.random.Generator) -> np.ndarray:
@@ -33,6 +35,8 @@ def measured_ranges(sensor: Sensor, directions: np.ndarray, hits: Hits, rng: np.
     smear = np.minimum(0.04 * sensor.divergence_mrad * 1e-3 * t * np.sqrt(1 - cosine**2) / cosine, 0.15)
     noise = np.hypot(spread, smear) * gauss[0] + ROUGHNESS[hits.material] * gauss[1]
     ranges = np.where(returned, mixed + noise, np.nan)
+    inside = ~returned & (hits.material == GLASS) & (chance[1] < INSIDE_SHARE) & (power > 0.3)
+    ranges[inside] = t[inside] + 0.3 + 4.0 * chance[2][inside] ** 2
     stray = chance[3] < STRAY_SHARE
     ranges[stray] = sensor.range_min + 50 * chance[0][stray] ** 2
     ranges[(ranges < sensor.range_min) | (ranges > sensor.range_max)] = np.nan

@@ -82,7 +82,7 @@ def choose_stands(
     return best[1]
 
 
-def single_stand(layout: Layout, rng: np.random.Generator) -> Stand:
+def single_stand(layout: Layout, rng: np.random.Generator, carrier: Carrier | None = None) -> Stand:
     """One sensor anywhere in the scene."""
-    carrier = draw_carrier(rng)
+    carrier = carrier or draw_carrier(rng)
     return _stand(layout, free_place(layout, carrier.room, rng), carrier, rng.uniform(0, 6.283), rng)

@@ -11,6 +11,7 @@ from ..ground import Terrain
 from ..layout import Layout, Surface
 from ..materials import MATERIAL_INDEX
 from ..plants import hedge
+from .backdrop import add_backdrop
 from .scatter import add_car, add_furniture, add_people, in_box, plant_bushes, plant_trees
 
 
@@ -47,6 +48,7 @@ def campus(rng: np.random.Generator) -> Layout:
     for xy in in_box(rng, (-45, -45), (45, 45), int(rng.integers(0, 9))):
         add_car(layout, xy, rng.uniform(0, 6.28), rng, leaves=0.25)
     add_people(layout, in_box(rng, (-35, -35), (35, 35), int(rng.integers(4, 22))), rng)
+    add_backdrop(layout, rng)
     return layout
 
 

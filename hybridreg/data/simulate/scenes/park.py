@@ -11,6 +11,7 @@ from ..ground import Terrain
 from ..layout import Layout
 from ..materials import MATERIAL_INDEX
 from ..plants import hedge
+from .backdrop import add_backdrop
 from .scatter import add_furniture, add_people, in_box, plant_bushes, plant_trees
 
 
@@ -51,6 +52,7 @@ def park(rng: np.random.Generator) -> Layout:
         layout.put(lamp(rng), xy, rng.uniform(0, 6.28), (0.2, 0.2))
     add_furniture(layout, in_box(rng, (-35, -15), (35, 15), int(rng.integers(4, 15))), rng.uniform(0, 6.28), rng)
     add_people(layout, in_box(rng, (-30, -20), (30, 20), int(rng.integers(3, 15))), rng)
+    add_backdrop(layout, rng)
     return layout
 
 
@@ -66,4 +68,5 @@ def woods(rng: np.random.Generator) -> Layout:
     start = rng.uniform(-30, 30, 2)
     layout.still.append(fence(rng, layout.line(start, start + rng.uniform(-30, 30, 2), 2.5)))
     add_people(layout, in_box(rng, (-25, -15), (25, 15), int(rng.integers(0, 5))), rng)
+    add_backdrop(layout, rng)
     return layout

@@ -10,6 +10,7 @@ from ..furniture import lamp
 from ..ground import Terrain
 from ..layout import Layout
 from ..materials import MATERIAL_INDEX
+from .backdrop import add_backdrop
 from .scatter import add_car, add_furniture, add_people, in_box, plant_bushes, plant_trees
 
 
@@ -40,6 +41,7 @@ def parking(rng: np.random.Generator) -> Layout:
             plant_trees(layout, np.c_[x, np.full(len(x), middle)], rng, "round")
     _surround(layout, half, rng)
     add_people(layout, in_box(rng, (-30, -30), (30, 30), int(rng.integers(1, 9))), rng)
+    add_backdrop(layout, rng)
     return layout
 
 

@@ -8,12 +8,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..buildings import building
-from ..furniture import bollards, lamp, sign, traffic_light
+from ..furniture import bollards, fence, lamp, sign, traffic_light
 from ..ground import Terrain
 from ..layout import Layout, Surface
 from ..materials import MATERIAL_INDEX
 from ..mesh import Mesh
+from ..plants import hedge
 from ..solids import boxes
+from .backdrop import add_backdrop
 from .scatter import add_car, add_furniture, add_people, in_box, plant_bushes, plant_trees
 
 
@@ -33,8 +35,9 @@ class Course:
     def draw(rng: np.random.Generator) -> Course:
         """Anything from a lane between walls to an avenue."""
         return Course(
-            rng.uniform(0, 3.5), rng.uniform(60, 160), rng.uniform(0, 6.28), rng.uniform(2.8, 7.5),
-            rng.uniform(1.6, 4.5), float(rng.choice([0.0, rng.uniform(1, 9)])),
+            rng.uniform(0, 3.5), rng.uniform(60, 160), rng.uniform(0, 6.28),
+            float(np.exp(rng.uniform(np.log(2.8), np.log(14)))), rng.uniform(1.6, 5.0),
+            float(rng.choice([0.0, rng.uniform(1, 16)], p=[0.35, 0.65])),
             float(rng.uniform(-30, 30)) if rng.random() < 0.45 else None,
         )  # fmt: skip
 
@@ -79,6 +82,7 @@ def street(rng: np.random.Generator) -> Layout:
         _houses(layout, course, side, rng)
         _roadside(layout, course, side, rng)
     _traffic(layout, course, rng)
+    add_backdrop(layout, rng)
     return layout
 
 
@@ -95,11 +99,11 @@ def _kerb(layout: Layout, course: Course, side: float) -> Mesh:
 
 
 def _houses(layout: Layout, course: Course, side: float, rng: np.random.Generator) -> None:
-    x = -95.0 + rng.uniform(0, 12)
+    x = -120.0 + rng.uniform(0, 12)
     eye = np.zeros(2)
     mean_height = rng.uniform(5, 18)
     gappy = rng.random() < 0.5
-    while x < 95:
+    while x < 120:
         size = np.array([rng.uniform(9, 28), rng.uniform(8, 14), np.clip(rng.normal(mean_height, 2.5), 3.5, 28)])
         mid = x + size[0] / 2
         back = course.road + course.pavement + course.lawn + size[1] / 2 + max(rng.normal(0.4, 1.0), 0.1)
@@ -124,8 +128,8 @@ def _roadside(layout: Layout, course: Course, side: float, rng: np.random.Genera
                 add_car(layout, course.at(x + rng.normal(0, 0.6), side * (course.road - 1.15)), yaw, rng)
     for x in np.arange(-80 + rng.uniform(0, 9), 80, rng.uniform(18, 32)):
         layout.put(lamp(rng), course.at(x, side * edge), -side * np.pi / 2, (0.2, 0.2))
-    if rng.random() < 0.65:
-        spacing = rng.uniform(7, 16)
+    if rng.random() < 0.75:
+        spacing = rng.uniform(5.5, 14)
         x = np.arange(-80, 80, spacing) + rng.normal(0, 0.8, len(np.arange(-80, 80, spacing)))
         line = edge + (0.4 if course.lawn == 0 else course.pavement + 0.5 * course.lawn)
         plant_trees(layout, np.stack([course.at(v, side * line) for v in x]), rng, "round" if rng.random() < 0.5 else None)
@@ -134,9 +138,25 @@ def _roadside(layout: Layout, course: Course, side: float, rng: np.random.Genera
     for _ in range(int(rng.integers(1, 5))):
         layout.put(sign(rng), course.at(rng.uniform(-50, 50), side * edge), rng.choice([0, np.pi]), (0.2, 0.2))
     if course.lawn > 1.5:
-        reach = course.road + course.pavement
-        places = [course.at(rng.uniform(-60, 60), side * (reach + rng.uniform(0, course.lawn))) for _ in range(12)]
-        plant_bushes(layout, np.stack(places), rng)
+        _front_gardens(layout, course, side, rng)
+
+
+def _front_gardens(layout: Layout, course: Course, side: float, rng: np.random.Generator) -> None:
+    reach = course.road + course.pavement
+
+    def places(n: int) -> np.ndarray:
+        return np.stack([course.at(rng.uniform(-75, 75), side * (reach + rng.uniform(0.3, course.lawn))) for _ in range(n)])
+
+    border = rng.choice(3)
+    for x in np.arange(-70, 70, rng.uniform(8, 20)):
+        xy, length = course.at(x, side * (reach + 0.5)), rng.uniform(4, 9)
+        if border == 0 and rng.random() < 0.7:
+            layout.put(hedge(rng, length), xy, course.yaw(x), (length / 2, 0.5))
+        elif border == 1 and rng.random() < 0.7:
+            ends = course.at(x - length / 2, side * (reach + 0.4)), course.at(x + length / 2, side * (reach + 0.4))
+            layout.still.append(fence(rng, layout.line(*ends, 2.2)))
+    plant_trees(layout, places(int(rng.integers(2, 14))), rng)
+    plant_bushes(layout, places(int(rng.integers(8, 32))), rng)
 
 
 def _traffic(layout: Layout, course: Course, rng: np.random.Generator) -> None:

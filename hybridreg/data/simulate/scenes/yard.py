@@ -11,6 +11,7 @@ from ..furniture import bollards, container, fence, heap, lamp, pipes, scaffold,
 from ..ground import Terrain
 from ..layout import Layout
 from ..materials import MATERIAL_INDEX
+from .backdrop import add_backdrop
 from .scatter import add_car, add_people, in_box, plant_bushes, plant_trees
 
 
@@ -36,6 +37,7 @@ def yard(rng: np.random.Generator) -> Layout:
         layout.put(lamp(rng), xy, rng.uniform(0, 6.28), (0.2, 0.2))
     add_people(layout, in_box(rng, (-30, -30), (30, 30), int(rng.integers(2, 10))), rng)
     plant_bushes(layout, in_box(rng, (-50, -50), (50, 50), int(rng.integers(5, 25))), rng)
+    add_backdrop(layout, rng)
     return layout
 
 
