@@ -153,7 +153,8 @@ def building(
     for i in range(4):
         a, b = corners[i], corners[(i + 1) % 4]
         outward = np.array([(b - a)[1], -(b - a)[0]]) / np.linalg.norm(b - a)
-        if (eye - (a + b) / 2) @ outward > -22:  # sensors keep within some 20 m of the eye
+        to_eye = eye - (a + b) / 2
+        if to_eye @ outward > -22 and np.hypot(*to_eye) < 85:  # sensors keep within some 20 m of the eye
             parts += facade(a, b, base, float(size[2]), style, rng)
         else:
             wall = np.array([[*a, base], [*b, base], [*b, base + size[2]], [*a, base + size[2]]])

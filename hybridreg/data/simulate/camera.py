@@ -55,8 +55,9 @@ def photograph(
     origin = camera.T_world_camera[:3, 3]
     hits = world.cast(origin, rays)
     hits = with_ground(hits, origin, rays, surface)
-    colour = light.sky(rays)
-    solid = np.flatnonzero(np.isfinite(hits.distance))
+    colour = np.empty_like(rays)
+    solid, open_sky = (np.flatnonzero(m) for m in (np.isfinite(hits.distance), np.isinf(hits.distance)))
+    colour[open_sky] = light.sky(rays[open_sky])
     colour[solid] = _surfaces(world, origin, rays[solid], _rows(hits, solid), light)
     return _develop(colour.reshape(HEIGHT, WIDTH, 3), light, rng)
 
@@ -86,14 +87,13 @@ def _surfaces(world: World, origin: np.ndarray, rays: np.ndarray, hits: Hits, li
 
 def _develop(colour: np.ndarray, light: Light, rng: np.random.Generator) -> NDArray[np.uint8]:
     """Lens blur, exposure, white balance, vignette, tone curve, sensor noise."""
-    from scipy.ndimage import gaussian_filter
+    import cv2
 
-    colour = gaussian_filter(colour, (0.55, 0.55, 0))
+    colour = cv2.GaussianBlur(colour, (3, 3), 0.55)
     level = np.percentile(colour[::4, ::4].mean(-1), 65)
-    colour = colour * (0.45 / max(float(level), 1e-3)) * light.exposure * light.white_balance
-    v, u = np.mgrid[-1 : 1 : HEIGHT * 1j, -1 : 1 : WIDTH * 1j]
-    colour *= (1 - light.vignette * (u**2 + v**2))[..., None]
-    curve = np.clip(colour, 0, None)
-    curve = (curve / (1 + 0.35 * curve)) ** (1 / 2.0)
+    gain = np.float32(0.45 / max(float(level), 1e-3) * light.exposure)
+    v, u = np.linspace(-1, 1, HEIGHT, dtype=np.float32)[:, None], np.linspace(-1, 1, WIDTH, dtype=np.float32)
+    colour = colour * (gain * (1 - light.vignette * (u**2 + v**2)))[..., None] * light.white_balance
+    curve = np.sqrt(np.maximum(colour / (1 + 0.35 * colour), 0))
     noise = rng.standard_normal(colour.shape, dtype=np.float32) * light.noise
     return (np.clip(curve + noise, 0, 1) * 255).astype(np.uint8)

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -11,7 +12,11 @@ from scipy.spatial.transform import Rotation
 from .cars import SHAPES, car
 from .layout import Layout
 from .mesh import EMPTY, Mesh
+from .pool import one_of
 from .solids import boxes, ellipsoid, tubes
+
+
+CARS = {kind: partial(car, kind=kind) for kind in ("hatchback", "estate", "suv")}
 
 
 @dataclass(frozen=True)
@@ -34,7 +39,7 @@ def carrier_named(kind: str, rng: np.random.Generator) -> Carrier:
         shape = str(rng.choice(["hatchback", "estate", "suv"]))
         lift = rng.uniform(0.22, 0.5)
         rack = boxes(np.array([[0, 0, 1.5]]), np.array([0.25, 0.25, 0.2]), 0.0, "metal", (0.2, 0.2, 0.2))
-        body = Mesh.merge([car(rng, shape).moved(0.0, (0.4, 0, 0)), rack])
+        body = Mesh.merge([one_of(CARS[shape], rng, 24, 0.02).moved(0.0, (0.4, 0, 0)), rack])
         return Carrier(body, SHAPES[shape].size[2] * 1.05 + lift, 1.6)
     if kind == "robot":
         height = rng.uniform(0.7, 1.3)

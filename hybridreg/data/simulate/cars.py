@@ -59,6 +59,11 @@ def car(rng: np.random.Generator, kind: str | None = None) -> Mesh:
     )
 
 
+def lorry(rng: np.random.Generator) -> Mesh:
+    """A lorry standing on the origin."""
+    return car(rng, "lorry")
+
+
 def _body(
     line: np.ndarray, length: float, height: float, bottom: float, widths: tuple[float, float, float]
 ) -> np.ndarray:

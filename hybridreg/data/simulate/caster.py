@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .mesh import Mesh
+from .solids import cross
 
 
 @dataclass(frozen=True)
@@ -85,44 +86,54 @@ def make_caster(mesh: Mesh) -> Caster:
         raise ImportError(f"the simulator needs Embree, run `pip install embreex` ({error})") from error
 
 
+class Part:
+    """A mesh with its caster and face normals, made once and used by every world it is part of."""
+
+    def __init__(self, mesh: Mesh) -> None:
+        self.mesh = mesh
+        self.normals = _face_normals(mesh)
+        self.caster = make_caster(mesh)
+
+
+def _face_normals(mesh: Mesh) -> NDArray[np.float32]:
+    a, b, c = (mesh.vertices[mesh.faces[:, k]] for k in range(3))
+    normal = cross(b - a, c - a)
+    return normal / np.maximum(np.sqrt(np.einsum("ij,ij->i", normal, normal)), 1e-12)[:, None]
+
+
 class World:
     """Still and moving geometry as it stands at one moment, ready for rays."""
 
-    def __init__(self, parts: list[tuple[Mesh, Caster]]) -> None:
-        self._parts = parts
+    def __init__(self, parts: list[Part]) -> None:
+        parts = [part for part in parts if len(part.mesh.faces)]
+        self._casters = [part.caster for part in parts]
+        self._first = np.cumsum([0] + [len(part.mesh.faces) for part in parts[:-1]])
+        self._normal = np.concatenate([part.normals for part in parts])
+        self._material = np.concatenate([part.mesh.material for part in parts])
+        self._tint = np.concatenate([part.mesh.tint for part in parts])
 
     def cast(self, origins: np.ndarray, directions: np.ndarray) -> Hits:
         """First hits of rays from `origins` (n,3) or (3,) along unit `directions` (n,3)."""
-        origins = np.broadcast_to(np.asarray(origins, np.float32), directions.shape)
-        n = len(directions)
-        distance = np.full(n, np.inf, np.float32)
-        normal = np.zeros((n, 3), np.float32)
-        material = np.zeros(n, np.uint8)
-        tint = np.zeros((n, 3), np.float32)
-        for mesh, caster in self._parts:
-            t, face = caster.cast(origins, directions)
+        origins = _starts(origins, directions)
+        distance, face = self._casters[0].cast(origins, directions)
+        for first, caster in zip(self._first[1:], self._casters[1:], strict=True):
+            t, other = caster.cast(origins, directions)
             nearer = t < distance
-            face = face[nearer]
-            distance[nearer] = t[nearer]
-            normal[nearer] = _normals(mesh, face, directions[nearer])
-            material[nearer] = mesh.material[face]
-            tint[nearer] = mesh.tint[face]
-        return Hits(distance, normal, material, tint)
+            distance = np.where(nearer, t, distance)
+            face = np.where(nearer, other + first, face)
+        normal = self._normal[face]  # a ray without a hit has face -1: its normal is never used
+        away = np.einsum("ij,ij->i", normal, directions) > 0
+        normal[away] *= -1
+        return Hits(distance, normal, self._material[face], self._tint[face])
 
-    def visible(self, origins: np.ndarray, directions: np.ndarray, up_to: float | np.ndarray) -> NDArray[np.bool_]:
+    def visible(self, origins: np.ndarray, directions: np.ndarray, up_to: np.ndarray | float) -> NDArray[np.bool_]:
         """Whether nothing stands within `up_to` metres along each ray."""
         free = np.ones(len(directions), bool)
-        origins = np.broadcast_to(np.asarray(origins, np.float32), directions.shape)
-        for _, caster in self._parts:
-            free &= caster.cast(origins, directions)[0] >= up_to
+        origins = _starts(origins, directions)
+        for caster in self._casters:
+            free[free] = caster.cast(origins[free], directions[free])[0] >= np.broadcast_to(up_to, free.shape)[free]
         return free
 
 
-def _normals(mesh: Mesh, face: np.ndarray, directions: np.ndarray) -> np.ndarray:
-    corners = mesh.vertices[mesh.faces[face]]
-    a, b = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-    normal = np.cross(a, b)
-    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
-    away = np.einsum("ij,ij->i", normal, directions) > 0
-    normal[away] *= -1
-    return normal
+def _starts(origins: np.ndarray, directions: np.ndarray) -> np.ndarray:
+    return np.ascontiguousarray(np.broadcast_to(np.asarray(origins, np.float32), directions.shape))

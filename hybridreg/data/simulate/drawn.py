@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from hybridreg import se3
 
 from .camera import Camera, photograph
-from .caster import Caster, World, make_caster
+from .caster import Part, World
 from .layout import Layout
 from .light import Light
 from .mesh import Mesh
@@ -84,9 +84,8 @@ def draw(tier: str, number: int, source: Sensor | None = None, target: Sensor | 
     return best[1]
 
 
-def _world(still: tuple[Mesh, Caster], moving: list[Mesh]) -> World:
-    movers = Mesh.merge(moving)
-    return World([still, (movers, make_caster(movers))] if len(movers.faces) else [still])
+def _world(still: Part, moving: list[Mesh]) -> World:
+    return World([still, Part(Mesh.merge(moving))])
 
 
 def _body(layout: Layout, stand: Stand) -> Mesh:
@@ -95,15 +94,13 @@ def _body(layout: Layout, stand: Stand) -> Mesh:
 
 def world_with(layout: Layout, stand: Stand) -> World:
     """The scene at the source's moment with one sensor's carrier in it."""
-    ground = Mesh.merge(layout.still)
-    return _world((ground, make_caster(ground)), [*layout.at_source, _body(layout, stand)])
+    return _world(Part(Mesh.merge(layout.still)), [*layout.at_source, _body(layout, stand)])
 
 
 def _common(tier: Tier, sensors: tuple[Sensor, Sensor], streams: _Streams) -> Drawn:
     kind = _pick(tier.scenes, streams.scene)
     layout = SCENES[kind](streams.scene)
-    ground = Mesh.merge(layout.still)
-    still = (ground, make_caster(ground))
+    still = Part(Mesh.merge(layout.still))
     stands = choose_stands(layout, World([still]), tier, sensors, streams.stands)
     bodies = [_body(layout, stand) for stand in stands]
     together = streams.stands.random() < 0.3  # two vehicles at a time, else one that comes back

@@ -27,22 +27,20 @@ class Layout:
     still: list[Mesh] = field(default_factory=list)
     at_source: list[Mesh] = field(default_factory=list)  # movers when the source scans (and the picture is taken)
     at_target: list[Mesh] = field(default_factory=list)  # the same movers when the target scans
-    taken: list[tuple[float, float, float, float, float]] = field(default_factory=list)  # x, y, half sizes, yaw
+    taken: np.ndarray = field(default_factory=lambda: np.zeros((0, 6)))  # x, y, half sizes, cosine and sine of yaw
 
     def free(self, xy: np.ndarray, radius: float) -> bool:
         """Whether a disc about `xy` (2,) touches nothing."""
-        if not self.taken:
-            return True
-        x, y, hx, hy, yaw = np.array(self.taken).T
+        x, y, hx, hy, c, s = self.taken.T
         dx, dy = xy[0] - x, xy[1] - y
-        c, s = np.cos(yaw), np.sin(yaw)
         gap_x = np.maximum(np.abs(c * dx + s * dy) - hx, 0)
         gap_y = np.maximum(np.abs(c * dy - s * dx) - hy, 0)
-        return bool((np.hypot(gap_x, gap_y) > radius).all())
+        return bool((gap_x**2 + gap_y**2 > radius**2).all())
 
     def claim(self, xy: np.ndarray, half: tuple[float, float], yaw: float = 0.0) -> None:
         """Mark a rectangle as taken."""
-        self.taken.append((float(xy[0]), float(xy[1]), half[0], half[1], yaw))
+        row = [[xy[0], xy[1], half[0], half[1], np.cos(yaw), np.sin(yaw)]]
+        self.taken = np.concatenate([self.taken, row])
 
     def on_ground(self, thing: Mesh, xy: np.ndarray, yaw: float = 0.0) -> Mesh:
         """`thing` (made about the origin) turned and set down at `xy`."""

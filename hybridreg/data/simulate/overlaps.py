@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 from scipy.spatial import cKDTree
 
@@ -32,11 +34,10 @@ def overlap(source: np.ndarray, target: np.ndarray, T_target_source: np.ndarray,
 
 
 def expected_overlap(
-    world: World, source: Sensor, target: Sensor, T_world_source: np.ndarray, T_world_target: np.ndarray, rays: int = 1200
+    world: World, source: Sensor, target: Sensor, T_world_source: np.ndarray, T_world_target: np.ndarray
 ) -> float:
     """A guess at `overlap` from some hundred rays: what share of the source's hits the target's beams reach."""
-    directions = pattern(source, np.random.default_rng(0))
-    directions = directions[:: max(1, len(directions) // rays)] @ T_world_source[:3, :3].T.astype(np.float32)
+    directions = _few_directions(source) @ T_world_source[:3, :3].T.astype(np.float32)
     hits = world.cast(T_world_source[:3, 3], directions)
     seen = (hits.distance > source.range_min) & (hits.distance < source.range_10)
     if seen.sum() < 30:
@@ -50,6 +51,12 @@ def expected_overlap(
     ray /= distance[:, None]
     reached = _near_a_beam(target, ray @ T_world_target[:3, :3], distance, np.abs(np.sum(normals * ray, axis=1)))
     return float((reached & world.visible(T_world_target[:3, 3], ray.astype(np.float32), distance - 0.3)).mean())
+
+
+@lru_cache(maxsize=16)
+def _few_directions(sensor: Sensor, rays: int = 1200) -> np.ndarray:
+    directions = pattern(sensor, np.random.default_rng(0))
+    return directions[:: max(1, len(directions) // rays)]
 
 
 def _near_a_beam(sensor: Sensor, ray: np.ndarray, distance: np.ndarray, cosine: np.ndarray) -> np.ndarray:

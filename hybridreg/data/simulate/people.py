@@ -30,8 +30,8 @@ def person(rng: np.random.Generator) -> Mesh:
     return Mesh.merge([legs, arms, torso, head])
 
 
-def bicycle(rng: np.random.Generator, with_rider: bool) -> Mesh:
-    """A bicycle along x, with or without somebody on it."""
+def bicycle(rng: np.random.Generator) -> Mesh:
+    """A bicycle along x."""
     tint = muted(rng)
     turn = np.linspace(0, 2 * np.pi, 11)
     rim = np.c_[0.33 * np.cos(turn), np.zeros(11), 0.34 + 0.33 * np.sin(turn)]
@@ -43,5 +43,9 @@ def bicycle(rng: np.random.Generator, with_rider: bool) -> Mesh:
     ends = np.array([[1, 2], [1, 3], [0, 3], [3, 2], [2, 4], [0, 1]])
     frame = tubes(knots[ends[:, 0]], knots[ends[:, 1]], 0.02, 0.02, "metal", tint, sides=4)
     bar = tubes(np.array([[0.4, -0.28, 1.05]]), np.array([[0.4, 0.28, 1.05]]), 0.02, 0.02, "metal", tint, sides=4)
-    rider = [person(rng).moved(0.0, (-0.1, 0.0, 0.25))] if with_rider else []
-    return Mesh.merge([*wheels, frame, bar, *rider])
+    return Mesh.merge([*wheels, frame, bar])
+
+
+def rider(rng: np.random.Generator) -> Mesh:
+    """Somebody on a bicycle."""
+    return Mesh.merge([bicycle(rng), person(rng).moved(0.0, (-0.1, 0.0, 0.25))])

@@ -3,20 +3,23 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 
 from .mesh import Mesh
+from .pool import one_of
 from .solids import boxes, cards, tubes
 
 _GREENS = np.array([[.24, .36, .12], [.32, .42, .16], [.18, .30, .14], [.42, .44, .18], [.50, .38, .15]])  # fmt: skip
+KINDS = {"round": 0.52, "tall": 0.2, "conifer": 0.18, "bare": 0.1}
 
 
-def tree(rng: np.random.Generator, leaves: int, kind: str | None = None) -> Mesh:
+def tree(rng: np.random.Generator, kind: str, leaves: int) -> Mesh:
     """A tree on the origin; `leaves` cards in all (fewer, larger ones for trees far away).
 
-    kind: "round", "tall", "conifer", "bare"; None draws one.
+    kind: "round", "tall", "conifer" or "bare".
     """
-    kind = kind or str(rng.choice(["round", "tall", "conifer", "bare"], p=[0.52, 0.2, 0.18, 0.1]))
     height = rng.uniform(4.5, 13.0)
     girth = 0.018 * height * rng.uniform(0.7, 1.4)
     lean = rng.normal(0, 0.035, 2) * height
@@ -33,6 +36,18 @@ def tree(rng: np.random.Generator, leaves: int, kind: str | None = None) -> Mesh
     if kind == "bare":
         return Mesh.merge([trunk, branches, _twigs(rng, tips, height, bark)])
     return Mesh.merge([trunk, branches, _crown(rng, kind, knee, top, tips, height, leaves)])
+
+
+# One maker for each kind and fineness, as the pool wants them.
+FINENESS = (480, 240, 110)
+TREES = {(kind, leaves): partial(tree, kind=kind, leaves=leaves) for kind in KINDS for leaves in FINENESS}
+
+
+def tree_from_pool(rng: np.random.Generator, distance: float, kind: str | None = None) -> Mesh:
+    """A tree as fine as its `distance` (metres) from the scene's centre deserves; kind None draws one."""
+    kind = kind or str(rng.choice(list(KINDS), p=list(KINDS.values())))
+    leaves = FINENESS[int(np.searchsorted([24.0, 45.0], distance))]
+    return one_of(TREES[kind, leaves], rng, variants=40, stretch=0.16)
 
 
 def _tips(rng: np.random.Generator, kind: str, knee: np.ndarray, top: np.ndarray, height: float) -> np.ndarray:
@@ -70,8 +85,9 @@ def _crown(
     return cards(centres, size, rng, "leaves", tint)
 
 
-def bush(rng: np.random.Generator, leaves: int = 90) -> Mesh:
+def bush(rng: np.random.Generator) -> Mesh:
     """A bush or tall weeds on the origin."""
+    leaves = 80
     width, height = rng.uniform(0.4, 1.3), rng.uniform(0.3, 1.6)
     offset = rng.normal(0, 0.5, (leaves, 3)) * [width, width, 0.45 * height] + [0, 0, 0.45 * height]
     offset[:, 2] = np.abs(offset[:, 2])

@@ -11,6 +11,7 @@ from ..ground import Terrain
 from ..layout import Layout, Surface
 from ..materials import MATERIAL_INDEX
 from ..plants import hedge
+from ..pool import one_of
 from .backdrop import add_backdrop
 from .scatter import add_car, add_furniture, add_people, in_box, plant_bushes, plant_trees
 
@@ -44,7 +45,7 @@ def campus(rng: np.random.Generator) -> Layout:
     _borders(layout, rng)
     add_furniture(layout, in_box(rng, (-40, -40), (40, 40), int(rng.integers(8, 26))), rng.uniform(0, 6.28), rng)
     for xy in in_box(rng, (-45, -45), (45, 45), int(rng.integers(3, 12))):
-        layout.put(lamp(rng), xy, rng.uniform(0, 6.28), (0.2, 0.2))
+        layout.put(one_of(lamp, rng), xy, rng.uniform(0, 6.28), (0.2, 0.2))
     for xy in in_box(rng, (-45, -45), (45, 45), int(rng.integers(0, 9))):
         add_car(layout, xy, rng.uniform(0, 6.28), rng, leaves=0.25)
     add_people(layout, in_box(rng, (-35, -35), (35, 35), int(rng.integers(4, 22))), rng)

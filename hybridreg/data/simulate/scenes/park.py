@@ -11,6 +11,7 @@ from ..ground import Terrain
 from ..layout import Layout
 from ..materials import MATERIAL_INDEX
 from ..plants import hedge
+from ..pool import one_of
 from .backdrop import add_backdrop
 from .scatter import add_furniture, add_people, in_box, plant_bushes, plant_trees
 
@@ -49,7 +50,7 @@ def park(rng: np.random.Generator) -> Layout:
             layout.claim(xy, (length / 2, 0.6), yaw)
             layout.still.append(layout.on_ground(hedge(rng, length), xy, yaw))
     for xy in in_box(rng, (-40, -12), (40, 12), int(rng.integers(2, 8))):
-        layout.put(lamp(rng), xy, rng.uniform(0, 6.28), (0.2, 0.2))
+        layout.put(one_of(lamp, rng), xy, rng.uniform(0, 6.28), (0.2, 0.2))
     add_furniture(layout, in_box(rng, (-35, -15), (35, 15), int(rng.integers(4, 15))), rng.uniform(0, 6.28), rng)
     add_people(layout, in_box(rng, (-30, -20), (30, 20), int(rng.integers(3, 15))), rng)
     add_backdrop(layout, rng)
@@ -64,7 +65,7 @@ def woods(rng: np.random.Generator) -> Layout:
     plant_trees(layout, places, rng, None if kind == "mixed" else kind)
     plant_bushes(layout, in_box(rng, (-50, -50), (50, 50), int(rng.integers(30, 80))), rng)
     for xy in in_box(rng, (-35, -35), (35, 35), int(rng.integers(1, 5))):
-        layout.put(heap(rng), xy, 0.0, (1.5, 1.5))
+        layout.put(one_of(heap, rng), xy, 0.0, (1.5, 1.5))
     start = rng.uniform(-30, 30, 2)
     layout.still.append(fence(rng, layout.line(start, start + rng.uniform(-30, 30, 2), 2.5)))
     add_people(layout, in_box(rng, (-25, -15), (25, 15), int(rng.integers(0, 5))), rng)

@@ -10,6 +10,7 @@ from ..furniture import lamp
 from ..ground import Terrain
 from ..layout import Layout
 from ..materials import MATERIAL_INDEX
+from ..pool import one_of
 from .backdrop import add_backdrop
 from .scatter import add_car, add_furniture, add_people, in_box, plant_bushes, plant_trees
 
@@ -35,7 +36,7 @@ def parking(rng: np.random.Generator) -> Layout:
                     place = np.array([x + rng.normal(0, 0.15), middle + side * 2.6 + rng.normal(0, 0.2)])
                     _parked(layout, place, rng)
         for x in np.arange(-half + 8, half, rng.uniform(20, 35)):
-            layout.put(lamp(rng), np.array([x, middle]), np.pi / 2, (0.2, 0.2))
+            layout.put(one_of(lamp, rng), np.array([x, middle]), np.pi / 2, (0.2, 0.2))
         if rng.random() < 0.5:
             x = np.arange(-half, half, rng.uniform(9, 20))
             plant_trees(layout, np.c_[x, np.full(len(x), middle)], rng, "round")

@@ -10,14 +10,9 @@ import numpy as np
 from ..cars import car
 from ..furniture import bench, billboard, bin_or_cabinet, lamp, sign
 from ..layout import Layout
-from ..mesh import Mesh
-from ..people import bicycle, person
-from ..plants import bush, tree
-
-
-def leaves_at(xy: np.ndarray) -> int:
-    """How many leaf cards a tree at `xy` deserves: many near the sensors, few far away."""
-    return int(np.clip(9000 / max(float(np.linalg.norm(xy)), 15.0), 110, 480))
+from ..people import bicycle, person, rider
+from ..plants import bush, tree_from_pool
+from ..pool import one_of
 
 
 def in_box(rng: np.random.Generator, low: Sequence[float], high: Sequence[float], n: int) -> np.ndarray:
@@ -30,13 +25,14 @@ def plant_trees(layout: Layout, places: np.ndarray, rng: np.random.Generator, ki
     """A tree at every place (n,2) that is free."""
     for xy in places:
         if layout.free(xy, 0.6):
-            layout.put(tree(rng, leaves_at(xy), kind), xy, 0.0, (0.35, 0.35))
+            thing = tree_from_pool(rng, float(np.hypot(*xy)), kind)
+            layout.put(thing, xy, rng.uniform(0, 6.28), (0.35, 0.35))
 
 
 def plant_bushes(layout: Layout, places: np.ndarray, rng: np.random.Generator) -> None:
     """A bush at every place (n,2) that is free."""
     for xy in places:
-        layout.put(bush(rng, 40 if np.linalg.norm(xy) > 35 else 90), xy, rng.uniform(0, 6.28), (0.5, 0.5))
+        layout.put(one_of(bush, rng, stretch=0.2), xy, rng.uniform(0, 6.28), (0.5, 0.5))
 
 
 def add_people(layout: Layout, places: np.ndarray, rng: np.random.Generator) -> None:
@@ -46,9 +42,9 @@ def add_people(layout: Layout, places: np.ndarray, rng: np.random.Generator) -> 
         heading = np.array([np.cos(yaw), np.sin(yaw)])
         if rng.random() < 0.2:
             moving = bool(rng.random() < 0.6)
-            layout.put_mover(bicycle(rng, moving), xy, yaw, heading * moving * rng.uniform(3, 15), (0.8, 0.3), _when(rng))
+            layout.put_mover(one_of(rider if moving else bicycle, rng), xy, yaw, heading * moving * rng.uniform(3, 15), (0.8, 0.3), _when(rng))
         else:
-            layout.put_mover(person(rng), xy, yaw, heading * max(0.0, rng.normal(1.5, 2.5)), (0.3, 0.3), _when(rng))
+            layout.put_mover(one_of(person, rng), xy, yaw, heading * max(0.0, rng.normal(1.5, 2.5)), (0.3, 0.3), _when(rng))
 
 
 def add_car(
@@ -59,7 +55,7 @@ def add_car(
     heading = np.array([np.cos(yaw), np.sin(yaw)])
     if not layout.free(xy, 1.3):
         return
-    body = car(rng)
+    body = one_of(car, rng, variants=160, stretch=0.03)
     if speed > 0 or rng.random() < leaves:
         layout.put_mover(body, xy, yaw, heading * speed, (half[1], half[1]), "both" if speed > 0 else _when(rng, 0.0))
     else:
@@ -75,5 +71,5 @@ def add_furniture(layout: Layout, places: np.ndarray, yaw: float, rng: np.random
     """Small things at `places` (n,2), turned by `yaw`."""
     makers = (bench, bin_or_cabinet, sign, billboard, lamp)
     for xy in places:
-        thing: Mesh = makers[rng.choice(5, p=[0.2, 0.3, 0.25, 0.1, 0.15])](rng)
+        thing = one_of(makers[rng.choice(5, p=[0.2, 0.3, 0.25, 0.1, 0.15])], rng, stretch=0.12)
         layout.put(thing, xy, yaw + rng.choice([0, np.pi / 2, np.pi]) + rng.normal(0, 0.1), (0.4, 0.4))

@@ -15,6 +15,7 @@ from ..materials import MATERIAL_INDEX
 from ..mesh import Mesh
 from ..plants import hedge
 from ..solids import boxes
+from ..pool import one_of
 from .backdrop import add_backdrop
 from .scatter import add_car, add_furniture, add_people, in_box, plant_bushes, plant_trees
 
@@ -127,7 +128,7 @@ def _roadside(layout: Layout, course: Course, side: float, rng: np.random.Genera
                 yaw = course.yaw(x) + (0 if side < 0 else np.pi) + rng.normal(0, 0.03)
                 add_car(layout, course.at(x + rng.normal(0, 0.6), side * (course.road - 1.15)), yaw, rng)
     for x in np.arange(-80 + rng.uniform(0, 9), 80, rng.uniform(18, 32)):
-        layout.put(lamp(rng), course.at(x, side * edge), -side * np.pi / 2, (0.2, 0.2))
+        layout.put(one_of(lamp, rng), course.at(x, side * edge), -side * np.pi / 2, (0.2, 0.2))
     if rng.random() < 0.75:
         spacing = rng.uniform(5.5, 14)
         x = np.arange(-80, 80, spacing) + rng.normal(0, 0.8, len(np.arange(-80, 80, spacing)))
@@ -136,7 +137,7 @@ def _roadside(layout: Layout, course: Course, side: float, rng: np.random.Genera
     spots = rng.uniform(-60, 60, int(rng.integers(6, 20)))
     add_furniture(layout, np.stack([course.at(v, side * (edge + rng.uniform(0.2, course.pavement))) for v in spots]), 0.0, rng)
     for _ in range(int(rng.integers(1, 5))):
-        layout.put(sign(rng), course.at(rng.uniform(-50, 50), side * edge), rng.choice([0, np.pi]), (0.2, 0.2))
+        layout.put(one_of(sign, rng), course.at(rng.uniform(-50, 50), side * edge), rng.choice([0, np.pi]), (0.2, 0.2))
     if course.lawn > 1.5:
         _front_gardens(layout, course, side, rng)
 
@@ -174,7 +175,7 @@ def _traffic(layout: Layout, course: Course, rng: np.random.Generator) -> None:
         for dx in (-1, 1):
             for side in (-1, 1):
                 xy = course.at(course.crossing + dx * (course.road + 0.6), side * (course.road + 0.6))
-                layout.put(traffic_light(rng), xy, rng.uniform(0, 6.28), (0.2, 0.2))
+                layout.put(one_of(traffic_light, rng), xy, rng.uniform(0, 6.28), (0.2, 0.2))
     elif rng.random() < 0.3:
         x0 = rng.uniform(-20, 20)
         layout.still.append(bollards(layout.line(course.at(x0, course.road + 0.3), course.at(x0 + 12, course.road + 0.3), 1.5)))

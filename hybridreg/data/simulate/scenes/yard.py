@@ -6,11 +6,12 @@ from __future__ import annotations
 import numpy as np
 
 from ..buildings import building
-from ..cars import car
+from ..cars import lorry
 from ..furniture import bollards, container, fence, heap, lamp, pipes, scaffold, wall
 from ..ground import Terrain
 from ..layout import Layout
 from ..materials import MATERIAL_INDEX
+from ..pool import one_of
 from .backdrop import add_backdrop
 from .scatter import add_car, add_people, in_box, plant_bushes, plant_trees
 
@@ -32,9 +33,9 @@ def yard(rng: np.random.Generator) -> Layout:
     for xy in in_box(rng, (-45, -45), (45, 45), int(rng.integers(3, 12))):
         add_car(layout, xy, rng.uniform(0, 6.28), rng, leaves=0.3)
     for xy in in_box(rng, (-40, -40), (40, 40), int(rng.integers(1, 5))):
-        layout.put(car(rng, "lorry"), xy, rng.uniform(0, 6.28), (4.2, 1.3))
+        layout.put(one_of(lorry, rng), xy, rng.uniform(0, 6.28), (4.2, 1.3))
     for xy in in_box(rng, (-40, -40), (40, 40), int(rng.integers(2, 7))):
-        layout.put(lamp(rng), xy, rng.uniform(0, 6.28), (0.2, 0.2))
+        layout.put(one_of(lamp, rng), xy, rng.uniform(0, 6.28), (0.2, 0.2))
     add_people(layout, in_box(rng, (-30, -30), (30, 30), int(rng.integers(2, 10))), rng)
     plant_bushes(layout, in_box(rng, (-50, -50), (50, 50), int(rng.integers(5, 25))), rng)
     add_backdrop(layout, rng)
@@ -57,11 +58,11 @@ def _stacks(layout: Layout, rng: np.random.Generator) -> None:
     for xy in in_box(rng, (-48, -48), (48, 48), int(rng.integers(6, 20))):
         yaw, kind = rng.uniform(0, 6.28), rng.choice(4, p=[0.4, 0.2, 0.3, 0.1])
         if kind == 0:
-            layout.put(container(rng), xy, yaw, (4.0, 1.3))
+            layout.put(one_of(container, rng), xy, yaw, (4.0, 1.3))
         elif kind == 1:
-            layout.put(pipes(rng), xy, yaw, (3.2, 1.2))
+            layout.put(one_of(pipes, rng), xy, yaw, (3.2, 1.2))
         elif kind == 2:
-            layout.put(heap(rng), xy, 0.0, (1.8, 1.8))
+            layout.put(one_of(heap, rng), xy, 0.0, (1.8, 1.8))
         else:
             layout.put(scaffold(rng, rng.uniform(6, 16)), xy, yaw, (5.0, 1.0))
 
