@@ -23,6 +23,7 @@ Array = NDArray[np.float64]
 # 225 crashes had no point with five neighbours within the radius of its normals; twice as much is asked for here.
 _SUPPORTED_POINTS, _NEIGHBOURS, _NORMAL_RADIUS = 10, 6, 3.0
 _FEWEST_MATCHES = 3
+_LARGEST_NOISE = 0.999
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -56,16 +57,22 @@ class KissMatcher(Stage):
         try:
             import kiss_matcher
         except ImportError as error:
-            raise ImportError(f'estimate="kiss" needs the wheel of KISS-Matcher: pip install kiss-matcher ({error})') from error
+            raise ImportError(f'estimate="kiss" needs `pip install kiss-matcher` ({error})') from error
 
         # Its own voxel grid depends on the order of a race between threads; ours makes the result repeatable.
         source = voxel_centroids(scene.pair.source.points, voxel)
         target = voxel_centroids(scene.pair.target.points, voxel)
         if not (_describable(source, voxel) and _describable(target, voxel)):
             return None
-        matcher = kiss_matcher.KISSMatcher(
-            kiss_matcher.KISSMatcherConfig(voxel, use_voxel_sampling=False, num_max_corr=self.max_matches)
+        # It clamps both noise bounds at a metre, and prints a warning where it does; so clamp before.
+        config = kiss_matcher.KISSMatcherConfig(
+            voxel,
+            use_voxel_sampling=False,
+            num_max_corr=self.max_matches,
+            robin_noise_bound_gain=min(1.0, _LARGEST_NOISE / voxel),
+            solver_noise_bound_gain=min(0.75, _LARGEST_NOISE / voxel),
         )
+        matcher = kiss_matcher.KISSMatcher(config)
         found_source, found_target = matcher.match(source.T, target.T)
         if len(found_source) < _FEWEST_MATCHES:
             return None

@@ -19,7 +19,7 @@ if (_root / "pyproject.toml").is_file() and (_root / "classical").is_dir():
 if TYPE_CHECKING:
     from hybridreg.api import register
     from hybridreg.classical.fgr import Fgr
-    from hybridreg.classical.fpfh import FpfhMatcher
+    from hybridreg.classical.fpfh import Fpfh
     from hybridreg.classical.gicp import Gicp
     from hybridreg.classical.icp import Icp
     from hybridreg.classical.kiss import KissMatcher
@@ -41,7 +41,7 @@ if TYPE_CHECKING:
 _WHERE = {
     "hybridreg.api": ["register"],
     "hybridreg.classical.fgr": ["Fgr"],
-    "hybridreg.classical.fpfh": ["FpfhMatcher"],
+    "hybridreg.classical.fpfh": ["Fpfh"],
     "hybridreg.classical.gicp": ["Gicp"],
     "hybridreg.classical.icp": ["Icp"],
     "hybridreg.classical.kiss": ["KissMatcher"],

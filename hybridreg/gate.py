@@ -29,8 +29,10 @@ def coordinates(x: Any, name: str) -> Array:
         raise ValueError(f"{name}: coordinates must be numbers, got dtype {array.dtype}; convert with astype(float)")
     if array.size == 0:
         raise ValueError(f"{name}: the cloud is empty (shape {array.shape}); it needs at least {MIN_POINTS} points")
-    if array.ndim != 2 or array.shape[1] < 3:
-        hint = "; transpose it" if array.ndim == 2 and array.shape[0] == 3 else ""
+    upright = array.ndim == 2 and array.shape[1] >= 3
+    lying = array.ndim == 2 and array.shape[0] == 3 and array.shape[1] >= MIN_POINTS
+    if lying or not upright:
+        hint = "; transpose it" if lying else ""
         raise ValueError(f"{name}: expected an array of shape (N, 3), got {array.shape}{hint}")
     return np.array(array[:, :3], dtype=np.float64)
 

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
@@ -50,16 +51,10 @@ class Pair:
         nonfinite: Literal["raise", "drop"] = "raise",
     ) -> Pair:
         """Build a pair from anything `PointCloud.of` takes, and a path or an array for the image."""
-        from hybridreg.io import as_image, read_image
-
-        if isinstance(image, (np.ndarray, list)) or hasattr(image, "detach"):
-            image = as_image(image)
-        elif image is not None:
-            image = read_image(image)
         return cls(
             source=PointCloud.of(source, name="source", nonfinite=nonfinite),
             target=PointCloud.of(target, name="target", nonfinite=nonfinite),
-            image=image,
+            image=None if image is None else _image(image),
             id=id,
             meta=dict(meta or {}),
         )
@@ -84,3 +79,9 @@ class LabelledPair:
 
     def __post_init__(self) -> None:
         se3.check(self.T_target_source, f"pair {self.pair.id}: T_target_source")
+
+
+def _image(image: Any) -> NDArray[np.uint8]:
+    from hybridreg.io import as_image, read_image
+
+    return read_image(image) if isinstance(image, (str, os.PathLike)) else as_image(image)

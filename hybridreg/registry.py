@@ -21,7 +21,7 @@ BUILT_IN = {
     "overlap.visibility": "hybridreg.classical.visibility:Visibility",
     "match.none": "hybridreg.classical.nothing:NoMatch",
     "match.given": "hybridreg.classical.nothing:GivenMatches",
-    "match.fpfh": "hybridreg.classical.fpfh:FpfhMatcher",
+    "match.fpfh": "hybridreg.classical.fpfh:Fpfh",
     "estimate.identity": "hybridreg.classical.nothing:Identity",
     "estimate.ransac": "hybridreg.classical.ransac:Ransac",
     "estimate.svd": "hybridreg.classical.svd:WeightedSvd",
