@@ -68,21 +68,28 @@ def _rows(hits: Hits, rows: np.ndarray) -> Hits:
 
 def _surfaces(world: World, origin: np.ndarray, rays: np.ndarray, hits: Hits, light: Light) -> np.ndarray:
     points = (origin + hits.distance[:, None] * rays).astype(np.float32)
-    facing = hits.normal @ light.sun
-    lit = np.flatnonzero(facing > 0)
-    sunlight = np.zeros(len(points), np.float32)
-    start = points[lit] + 0.03 * hits.normal[lit]
-    to_sun = np.broadcast_to(light.sun.astype(np.float32), (len(lit), 3))
-    sunlight[lit] = facing[lit] * world.visible(start, to_sun, np.inf)
+    sunlight = _sunlight(world, points, hits.normal, light)
     shade = light.ambient * (0.75 + 0.25 * hits.normal[:, 2:3]) + light.sunshine * sunlight[:, None]
     colour = hits.tint * shade_factor(points, hits.normal, hits.material)[:, None] * shade
-    gloss = GLOSS[hits.material].astype(np.float32)
+    gloss = GLOSS[hits.material]
     shiny = np.flatnonzero(gloss > 0)
     if len(shiny):
         away = rays[shiny] - 2 * np.sum(rays[shiny] * hits.normal[shiny], axis=1, keepdims=True) * hits.normal[shiny]
         colour[shiny] += gloss[shiny, None] * (light.sky(away) - colour[shiny])
     haze = 1 - np.exp(-hits.distance / light.visibility)[:, None]
     return colour + haze * (light.horizon - colour)
+
+
+def _sunlight(world: World, points: np.ndarray, normal: np.ndarray, light: Light) -> np.ndarray:
+    """Cosine of the sun's incidence (n,), zero in shadow."""
+    facing = normal @ light.sun
+    sunlight = np.zeros(len(points), np.float32)
+    if light.sunshine.max() < 0.02:  # overcast: no shadows to look for
+        return sunlight
+    lit = np.flatnonzero(facing > 0)
+    to_sun = np.broadcast_to(light.sun, (len(lit), 3))
+    sunlight[lit] = facing[lit] * world.visible(points[lit] + 0.03 * normal[lit], to_sun, np.inf)
+    return sunlight
 
 
 def _develop(colour: np.ndarray, light: Light, rng: np.random.Generator) -> NDArray[np.uint8]:

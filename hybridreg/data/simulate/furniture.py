@@ -13,7 +13,7 @@ GREY = (0.45, 0.46, 0.47)
 
 def muted(rng: np.random.Generator, strength: float = 0.45) -> np.ndarray:
     """A colour (3,) as painted metal, cloth or plaster has it: a grey with a leaning."""
-    leaning = rng.dirichlet(np.ones(3)) * 3 - 1
+    leaning = rng.dirichlet(np.full(3, 4.0)) * 3 - 1
     return np.clip(rng.uniform(0.12, 0.75) * (1 + strength * leaning), 0.03, 0.95)
 
 

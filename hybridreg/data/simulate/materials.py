@@ -46,10 +46,10 @@ MATERIALS = (
     Material("wood", 0.45, 0.006, 0.01, "stains", 0.25),
 )
 MATERIAL_INDEX = {material.name: index for index, material in enumerate(MATERIALS)}
-REFLECTIVITY = np.array([m.reflectivity for m in MATERIALS])
-ROUGHNESS = np.array([m.roughness for m in MATERIALS])
-LOST = np.array([m.lost for m in MATERIALS])
-CONTRAST = np.array([m.contrast for m in MATERIALS])
-GLOSS = np.array([m.gloss for m in MATERIALS])
+REFLECTIVITY = np.array([m.reflectivity for m in MATERIALS], np.float32)
+ROUGHNESS = np.array([m.roughness for m in MATERIALS], np.float32)
+LOST = np.array([m.lost for m in MATERIALS], np.float32)
+CONTRAST = np.array([m.contrast for m in MATERIALS], np.float32)
+GLOSS = np.array([m.gloss for m in MATERIALS], np.float32)
 COLOUR = np.array([m.colour for m in MATERIALS], np.float32)
 GROUND = MATERIAL_INDEX["ground"]

@@ -54,7 +54,7 @@ def expected_overlap(
 
 
 @lru_cache(maxsize=16)
-def _few_directions(sensor: Sensor, rays: int = 1200) -> np.ndarray:
+def _few_directions(sensor: Sensor, rays: int = 700) -> np.ndarray:
     directions = pattern(sensor, np.random.default_rng(0))
     return directions[:: max(1, len(directions) // rays)]
 

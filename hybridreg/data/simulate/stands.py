@@ -14,7 +14,8 @@ from .overlaps import expected_overlap
 from .sensors import Sensor
 from .tiers import Tier
 
-PROPOSALS = 14
+PROPOSALS = 12
+CLOSE_ENOUGH = 0.1  # between the wanted and the expected overlap
 
 
 @dataclass(frozen=True)
@@ -76,7 +77,7 @@ def choose_stands(
         miss = abs(guess - wanted)
         if best is None or miss < best[0]:
             best = (miss, stands)
-        if miss < 0.08:
+        if miss < CLOSE_ENOUGH:
             break
     assert best is not None
     return best[1]

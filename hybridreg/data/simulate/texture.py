@@ -11,6 +11,8 @@ from scipy.ndimage import zoom
 from .materials import CONTRAST, MATERIALS
 
 _SIZE = 256
+_NAMES = tuple(dict.fromkeys(m.texture for m in MATERIALS))
+_KIND = np.array([_NAMES.index(m.texture) for m in MATERIALS], np.uint8)
 
 
 @lru_cache(maxsize=1)
@@ -26,8 +28,9 @@ def _noise() -> np.ndarray:
 
 def noise_at(u: np.ndarray, v: np.ndarray, metres: float) -> np.ndarray:
     """Noise at coordinates in metres, one tile spread over `metres`."""
-    scale = _SIZE / metres
-    return _noise()[(u * scale).astype(np.int64) % _SIZE, (v * scale).astype(np.int64) % _SIZE]
+    scale = np.float32(_SIZE / metres)
+    row, column = (np.floor(x * scale).astype(np.int32) & (_SIZE - 1) for x in (u, v))
+    return _noise()[row, column]
 
 
 def _grid_lines(u: np.ndarray, v: np.ndarray, wide: float, high: float, joint: float, stagger: bool) -> np.ndarray:
@@ -59,9 +62,9 @@ def shade_factor(points: np.ndarray, normal: np.ndarray, material: np.ndarray) -
     along_x = np.abs(normal[:, 1]) > np.abs(normal[:, 0])
     u = np.where(flat | along_x, points[:, 0], points[:, 1])
     v = np.where(flat, points[:, 1], points[:, 2])
-    for name in {m.texture for m in MATERIALS} - {"none"}:
-        rows = np.array([i for i, m in enumerate(MATERIALS) if m.texture == name])
-        mine = np.flatnonzero(np.isin(material, rows))
-        if len(mine):
+    kind = _KIND[material]
+    for number, name in enumerate(_NAMES):
+        mine = np.flatnonzero(kind == number)
+        if name != "none" and len(mine):
             factor[mine] += CONTRAST[material[mine]] * _pattern(name, u[mine], v[mine])
     return np.clip(factor, 0.2, 2.2)

@@ -18,7 +18,7 @@ class Tier:
 
 
 TIERS = {
-    "near": Tier((3.5, 6.5), (0.45, 0.95), USUAL),
+    "near": Tier((3.5, 6.5), (0.5, 0.95), USUAL),
     "mid": Tier((12.0, 18.0), (0.25, 0.8), USUAL),
     "far": Tier((25.0, 35.0), (0.12, 0.6), USUAL),
     "degenerate": Tier((3.0, 15.0), (0.15, 1.0), DEGENERATE),
