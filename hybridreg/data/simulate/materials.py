@@ -23,11 +23,12 @@ class Material:
 
 
 MATERIALS = (
-    # Terrain triangles carry this one; which of the next five a hit is, the layout says.
+    # Terrain triangles carry this one; which of the next six a hit is, the layout says.
     Material("ground", 0.30, 0.010, 0.01, "none", 0.0),
     Material("asphalt", 0.20, 0.006, 0.01, "speckle", 0.10, colour=(0.30, 0.30, 0.31)),
     Material("paving", 0.32, 0.005, 0.01, "tiles", 0.16, colour=(0.52, 0.51, 0.49)),
     Material("grass", 0.50, 0.035, 0.02, "grass", 0.28, colour=(0.27, 0.37, 0.14)),
+    Material("meadow", 0.50, 0.110, 0.03, "grass", 0.35, colour=(0.36, 0.38, 0.17)),  # tall grass and weeds
     Material("soil", 0.30, 0.025, 0.02, "patches", 0.25, colour=(0.38, 0.31, 0.22)),
     Material("gravel", 0.30, 0.020, 0.02, "speckle", 0.22, colour=(0.50, 0.47, 0.42)),
     Material("brick", 0.35, 0.006, 0.01, "bricks", 0.30),

@@ -16,12 +16,12 @@ RADIUS = 0.5  # metres; the definition that the real pairs' figures use
 
 
 def thin(points: np.ndarray, voxel: float) -> np.ndarray:
-    """One point (the first) of each occupied cube of edge `voxel`, in firing order."""
+    """One measured point (the first) of each occupied cube of edge `voxel`, cube after cube: it compresses well."""
     cell = np.floor(points / voxel).astype(np.int64)
     cell -= cell.min(axis=0)
     span = cell.max(axis=0) + 1
     _, first = np.unique((cell[:, 0] * span[1] + cell[:, 1]) * span[2] + cell[:, 2], return_index=True)
-    return points[np.sort(first)]
+    return points[first]
 
 
 def overlap(source: np.ndarray, target: np.ndarray, T_target_source: np.ndarray, radius: float = RADIUS) -> float:

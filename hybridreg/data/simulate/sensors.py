@@ -50,7 +50,7 @@ SENSORS = {
         Sensor(name="hdl64e", kind="spinning", elevations_deg=_HDL64E, points=64 * 2083, range_min=0.9, range_10=50,
                range_max=90, noise_m=0.015),
         Sensor(name="os1-64", kind="spinning", elevations_deg=_steps((-16.6, 16.6, 64)), points=64 * 2048,
-               range_min=0.8, range_10=35, noise_m=0.018, noise_growth=0.0006, divergence_mrad=3.2),
+               range_min=0.8, range_10=26, noise_m=0.018, noise_growth=0.0006, divergence_mrad=3.2),
         Sensor(name="pandar64", kind="spinning", elevations_deg=_PANDAR64, points=64 * 1800, range_10=80, range_max=200),
         Sensor(name="pandarqt", kind="spinning", elevations_deg=_steps((-52.1, 52.1, 64)), points=64 * 600,
                range_min=0.1, range_10=18, range_max=60),

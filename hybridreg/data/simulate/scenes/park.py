@@ -35,7 +35,7 @@ def _with_path(rng: np.random.Generator, ground: str, relief: float, bumps: floa
 
 def park(rng: np.random.Generator) -> Layout:
     """Lawns with scattered trees, hedges, benches, now and then a house at the rim."""
-    layout = _with_path(rng, "grass", rng.uniform(0.5, 1.4), 0.03)
+    layout = _with_path(rng, str(rng.choice(["grass", "grass", "meadow"])), rng.uniform(0.5, 1.4), 0.03)
     for _ in range(int(rng.integers(1, 5))):
         angle, far = rng.uniform(0, 6.28), rng.uniform(28, 65)
         xy, size = far * np.array([np.cos(angle), np.sin(angle)]), rng.uniform([8, 7, 3.5], [25, 14, 12])
@@ -59,7 +59,7 @@ def park(rng: np.random.Generator) -> Layout:
 
 def woods(rng: np.random.Generator) -> Layout:
     """Trunks and undergrowth on rough ground, a track, a fence, a heap of timber."""
-    layout = _with_path(rng, "soil", rng.uniform(0.8, 1.8), 0.06)
+    layout = _with_path(rng, str(rng.choice(["soil", "meadow", "meadow"])), rng.uniform(0.8, 1.8), 0.06)
     kind = str(rng.choice(["round", "conifer", "mixed"]))
     places = in_box(rng, (-65, -65), (65, 65), int(rng.integers(60, 95)))
     plant_trees(layout, places, rng, None if kind == "mixed" else kind)
