@@ -17,7 +17,10 @@ TIER, SPLIT, SEED, INDEX, VOXEL = "near", "val", 7, 0, 0.2
 def main() -> None:
     """Draw, thin, write."""
     drawn = simulate.draw(
-        TIER, simulate.pair_number(SPLIT, SEED, INDEX), simulate.SENSORS["mems-fan"], simulate.SENSORS["hdl64e"]
+        TIER,
+        simulate.pair_number(SPLIT, SEED, INDEX),
+        simulate.SENSORS["mems-fan"],
+        simulate.SENSORS["hdl64e"],
     )
     facts = {
         "id": pair_id(SPLIT, TIER, SEED, INDEX),

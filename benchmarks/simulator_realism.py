@@ -14,6 +14,7 @@ more; as a share of the mean for counts and distances). A simulated median insid
 from __future__ import annotations
 
 import argparse
+import itertools
 import os
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -65,7 +66,7 @@ def range_shares(points: np.ndarray) -> dict[str, float]:
     """Share of the points in each range bin; the sensor's own carrier (under 2.5 m) left out."""
     distance = np.linalg.norm(points, axis=1)
     counts, _ = np.histogram(distance[distance > 2.5], RANGE_EDGES)
-    labels = [f"{a}-{b} m" if b < 500 else f"over {a} m" for a, b in zip(RANGE_EDGES, RANGE_EDGES[1:], strict=False)]
+    labels = [f"{a}-{b} m" if b < 500 else f"over {a} m" for a, b in itertools.pairwise(RANGE_EDGES)]
     return {f"points at {k}": float(v) for k, v in zip(labels, counts / max(counts.sum(), 1), strict=True)}
 
 
@@ -90,7 +91,11 @@ def shape_shares(points: np.ndarray, radius: float = 1.0) -> dict[str, float]:
         if len(neighbours) < 6:
             continue
         values = np.sqrt(np.maximum(np.linalg.eigvalsh(np.cov(points[neighbours].T))[::-1], 0))
-        features = [(values[1] - values[2]) / values[0], (values[0] - values[1]) / values[0], values[2] / values[0]]
+        features = [
+            (values[1] - values[2]) / values[0],
+            (values[0] - values[1]) / values[0],
+            values[2] / values[0],
+        ]
         wins[int(np.argmax(features))] += 1
     return dict(zip(("planar", "linear", "scattered"), wins / max(wins.sum(), 1), strict=True))
 
@@ -124,7 +129,9 @@ def simulated_clouds(match: Match, n: int) -> Iterator[np.ndarray]:
         layout = SCENES[match.scenes[k % len(match.scenes)]](rng)
         # No body under the sensor: its points are left out of the figures, and real mounts clear their roofs.
         stand = single_stand(layout, rng, Carrier(EMPTY, match.height, 1.6))
-        yield scan(world_with(layout, stand), layout.surface, SENSORS[match.sensor], stand.T_world_sensor, rng)
+        yield scan(
+            world_with(layout, stand), layout.surface, SENSORS[match.sensor], stand.T_world_sensor, rng
+        )
 
 
 Figures = list[dict[str, float]]

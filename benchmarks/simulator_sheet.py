@@ -25,7 +25,11 @@ def draw_pair(axes: np.ndarray, tier: str, index: int, seed: int) -> None:
     """One column: bird's-eye view above, photograph below."""
     sample = simulate.pair(tier, seed=seed, index=index, split="val")
     T = sample.T_target_source
-    source = se3.apply(T, thin(sample.pair.source.points, 0.15)) if tier != "disjoint" else sample.pair.source.points
+    source = (
+        se3.apply(T, thin(sample.pair.source.points, 0.15))
+        if tier != "disjoint"
+        else sample.pair.source.points
+    )
     target = thin(sample.pair.target.points, 0.15)
     top, bottom = axes
     top.scatter(target[:, 0], target[:, 1], s=0.25, c="#2b6cb0", lw=0, alpha=0.5)

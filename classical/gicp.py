@@ -71,7 +71,10 @@ def not_worse(scene: Scene, before: Pose, T: Array) -> Pose:
     """
     if not np.isfinite(T).all():
         return before
-    on = [measure(scene.source.points, tree(scene, "target"), M, 1.25 * scene.spacing).fitness for M in (before.T, T)]
+    on = [
+        measure(scene.source.points, tree(scene, "target"), M, 1.25 * scene.spacing).fitness
+        for M in (before.T, T)
+    ]
     return Pose(T, before.inliers, before.rivals) if on[1] >= 0.98 * on[0] else before
 
 

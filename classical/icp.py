@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from hybridreg import se3
 from hybridreg.matches import Pose
 from hybridreg.normals import surface, tree
+from hybridreg.resources import n_threads
 from hybridreg.scene import Scene
 from hybridreg.stage import Stage
 
@@ -57,7 +58,9 @@ class Icp(Stage):
 
     def _step(self, scene: Scene, T: Array, max_distance: float) -> Array | None:
         moved = se3.apply(T, scene.source.points)
-        distance, index = tree(scene, "target").query(moved, distance_upper_bound=max_distance, workers=-1)
+        distance, index = tree(scene, "target").query(
+            moved, distance_upper_bound=max_distance, workers=n_threads()
+        )
         hit = np.isfinite(distance)
         if hit.sum() < _FEWEST:
             return None

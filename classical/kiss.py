@@ -14,6 +14,7 @@ from hybridreg.classical.voxel import voxel_centroids
 from hybridreg.fitness import measure
 from hybridreg.matches import Correspondences, Pose
 from hybridreg.normals import tree
+from hybridreg.resources import n_threads
 from hybridreg.scene import Scene
 from hybridreg.stage import Stage
 
@@ -85,7 +86,9 @@ class KissMatcher(Stage):
 
 
 def _describable(points: Array, voxel: float) -> bool:
-    counts = cKDTree(points).query_ball_point(points, _NORMAL_RADIUS * voxel, return_length=True, workers=-1)
+    counts = cKDTree(points).query_ball_point(
+        points, _NORMAL_RADIUS * voxel, return_length=True, workers=n_threads()
+    )
     return int(np.count_nonzero(counts >= _NEIGHBOURS)) >= _SUPPORTED_POINTS
 
 

@@ -36,7 +36,9 @@ class GivenMatches(Stage):
     gives: ClassVar[frozenset[str]] = frozenset({"matches", "group"})
 
     def __call__(self, scene: Scene, overlap: Overlap) -> Correspondences:
-        raise ValueError(f"pair {scene.pair.id}: this pipeline takes your own matches; call run(pair, matches=...)")
+        raise ValueError(
+            f"pair {scene.pair.id}: this pipeline takes your own matches; call run(pair, matches=...)"
+        )
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -12,6 +12,7 @@ from scipy.spatial import cKDTree
 
 from hybridreg.cloud import PointCloud
 from hybridreg.pair import Pair
+from hybridreg.resources import n_threads
 from hybridreg.scene import Level, Scene
 from hybridreg.stage import Stage
 
@@ -57,7 +58,7 @@ def _scene(pair: Pair, source: Array, target: Array) -> Scene:
 
 def _level(cloud: PointCloud, points: Array) -> Level:
     # The 90th percentile, because a LiDAR's neighbours along one ring are far nearer than its rings.
-    distance, _ = cKDTree(points).query(points, k=2, workers=-1)
+    distance, _ = cKDTree(points).query(points, k=2, workers=n_threads())
     nonzero = distance[:, 1][distance[:, 1] > 0.0]
     spacing = float(np.quantile(nonzero, 0.9)) if len(nonzero) else 1e-3
     return Level(points=points, spacing=spacing, viewpoint=cloud.viewpoint)

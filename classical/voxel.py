@@ -53,7 +53,8 @@ class VoxelGrid(Stage):
             dense = int(np.argmax([len(p) for p in points]))
             points[dense], spacing[dense] = _thin(clouds[dense].points, voxel, len(points[1 - dense]))
         source, target = (
-            Level(points=p, spacing=s, viewpoint=c.viewpoint) for p, s, c in zip(points, spacing, clouds, strict=True)
+            Level(points=p, spacing=s, viewpoint=c.viewpoint)
+            for p, s, c in zip(points, spacing, clouds, strict=True)
         )
         scene = Scene(pair=pair, source=source, target=target)
         if self.voxel is None:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from hybridreg import se3
+from hybridreg.resources import n_threads
 
 Array = NDArray[np.float64]
 
@@ -40,7 +41,7 @@ def measure(source: Array, target: cKDTree | Array, T: Array, max_distance: floa
         Metres; a neighbour must be nearer than this.
     """
     tree = target if isinstance(target, cKDTree) else cKDTree(target)
-    distance, index = tree.query(se3.apply(T, source), distance_upper_bound=max_distance, workers=-1)
+    distance, index = tree.query(se3.apply(T, source), distance_upper_bound=max_distance, workers=n_threads())
     hit = np.isfinite(distance)
     rows = np.flatnonzero(hit)
     rmse = float(np.sqrt(np.mean(distance[hit] ** 2))) if len(rows) else 0.0

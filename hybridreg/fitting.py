@@ -30,7 +30,9 @@ def with_voxel(downsample: Any, voxel: float | None) -> Any:
     if voxel is None:
         return downsample
     if not hasattr(downsample, "voxel"):
-        raise ValueError(f"voxel={voxel} was given, but {type(downsample).__name__} has no voxel; leave one of them out")
+        raise ValueError(
+            f"voxel={voxel} was given, but {type(downsample).__name__} has no voxel; leave one of them out"
+        )
     if downsample.voxel not in (None, voxel):
         raise ValueError(f"voxel={voxel} contradicts the downsampling stage's own voxel={downsample.voxel}")
     return dataclasses.replace(downsample, voxel=voxel)
@@ -65,7 +67,9 @@ def check_image(pipeline: Pipeline, pair: Pair) -> None:
         return
     for slot in SLOTS:
         if "image" in _words(getattr(pipeline, slot), "needs"):
-            raise ValueError(f"pair {pair.id}: {_label(getattr(pipeline, slot))} needs an image; pass image=...")
+            raise ValueError(
+                f"pair {pair.id}: {_label(getattr(pipeline, slot))} needs an image; pass image=..."
+            )
 
 
 def check_scene(scene: Scene) -> None:

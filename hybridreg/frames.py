@@ -59,7 +59,7 @@ def lower_matches(matches: Any, pair: Pair) -> Correspondences:
             f"matches: expected Correspondences or integer rows of shape (K, 2), got {rows.dtype} {rows.shape}"
         )
     for column, name, cloud in ((0, "source", pair.source), (1, "target", pair.target)):
-        if len(rows) and not (0 <= rows[:, column].min() and rows[:, column].max() < len(cloud)):
+        if len(rows) and not (rows[:, column].min() >= 0 and rows[:, column].max() < len(cloud)):
             raise ValueError(
                 f"matches: column {column} names rows {rows[:, column].min()} to {rows[:, column].max()}, "
                 f"but the {name} has {len(cloud)} points"

@@ -26,9 +26,13 @@ def coordinates(x: Any, name: str) -> Array:
         return read_points(x)
     array = _as_array(x, name)
     if array.dtype.kind not in "fiu":
-        raise ValueError(f"{name}: coordinates must be numbers, got dtype {array.dtype}; convert with astype(float)")
+        raise ValueError(
+            f"{name}: coordinates must be numbers, got dtype {array.dtype}; convert with astype(float)"
+        )
     if array.size == 0:
-        raise ValueError(f"{name}: the cloud is empty (shape {array.shape}); it needs at least {MIN_POINTS} points")
+        raise ValueError(
+            f"{name}: the cloud is empty (shape {array.shape}); it needs at least {MIN_POINTS} points"
+        )
     upright = array.ndim == 2 and array.shape[1] >= 3
     lying = array.ndim == 2 and array.shape[0] == 3 and array.shape[1] >= MIN_POINTS
     if lying or not upright:
@@ -42,14 +46,18 @@ def _as_array(x: Any, name: str) -> NDArray[Any]:
         x = x.detach().cpu().numpy()
     elif hasattr(x, "point") and hasattr(x, "to_legacy"):  # Open3D tensor cloud
         if "positions" not in x.point:
-            raise ValueError(f"{name}: the cloud is empty (it has no positions); it needs at least {MIN_POINTS} points")
+            raise ValueError(
+                f"{name}: the cloud is empty (it has no positions); it needs at least {MIN_POINTS} points"
+            )
         x = x.point["positions"].cpu().numpy()
     elif hasattr(x, "points"):  # Open3D legacy cloud, or anything shaped like one
         x = x.points
     try:
         return np.asarray(x)
     except (ValueError, TypeError) as error:
-        raise ValueError(f"{name}: cannot read an array of shape (N, 3) from {type(x).__name__}: {error}") from error
+        raise ValueError(
+            f"{name}: cannot read an array of shape (N, 3) from {type(x).__name__}: {error}"
+        ) from error
 
 
 def finite(points: Array, name: str, *, drop: bool) -> Array:
@@ -79,11 +87,15 @@ def check(points: Array, name: str) -> None:
         raise ValueError(f"{name}: {len(points)} points are too few; it needs at least {MIN_POINTS}")
     largest = float(np.abs(points).max())
     if largest > _LARGEST:
-        raise ValueError(f"{name}: a coordinate of {largest:.3g} m cannot be real; check the file and its unit")
+        raise ValueError(
+            f"{name}: a coordinate of {largest:.3g} m cannot be real; check the file and its unit"
+        )
     centred = points - points.mean(axis=0)
     extent = np.ptp(points, axis=0)
     if not extent.max() > 1e-9 * max(largest, 1e-300):
-        raise ValueError(f"{name}: all {len(points)} points lie in one place; a pose needs points spread in space")
+        raise ValueError(
+            f"{name}: all {len(points)} points lie in one place; a pose needs points spread in space"
+        )
     spread = np.linalg.svd(centred.T @ centred / extent.max() ** 2, compute_uv=False)
     if spread[1] <= _THINNEST**2 * spread[0]:
         raise ValueError(

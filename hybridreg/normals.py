@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from hybridreg.resources import n_threads
 from hybridreg.scene import Level, Scene
 
 Array = NDArray[np.float64]
@@ -40,7 +41,7 @@ def tree(scene: Scene, side: Literal["source", "target"]) -> cKDTree:
 def estimate(points: Array, viewpoint: Array | None, k: int = 20) -> Surface:
     """Normals (n, 3) of `points` (n, 3): the direction of least spread among the k nearest neighbours."""
     k = min(k, len(points))
-    _, index = cKDTree(points).query(points, k=k, workers=-1)
+    _, index = cKDTree(points).query(points, k=k, workers=n_threads())
     neighbours = points[index.reshape(len(points), k)]
     centred = neighbours - neighbours.mean(axis=1, keepdims=True)
     values, vectors = np.linalg.eigh(np.einsum("nki,nkj->nij", centred, centred) / k)

@@ -90,7 +90,9 @@ class Pipeline(Stage):
         """A copy with some slots filled anew: `pipe.swap(estimate="ransac")`."""
         unknown = set(stages) - {*SLOTS, "voxel"}
         if unknown:
-            raise TypeError(f"no slot is called {', '.join(sorted(unknown))}; the slots are {', '.join(SLOTS)}")
+            raise TypeError(
+                f"no slot is called {', '.join(sorted(unknown))}; the slots are {', '.join(SLOTS)}"
+            )
         if "downsample" in stages:
             stages.setdefault("voxel", None)
         elif stages.get("voxel") is not None:
@@ -117,7 +119,11 @@ class Pipeline(Stage):
             For clouds that no pose can be computed from, naming cloud, number and cure.
         """
         reset_peak_memory()
-        trace = self.trace(pair, seed=seed, matches=matches)
+        return self.conclude(self.trace(pair, seed=seed, matches=matches), seed=seed)
+
+    def conclude(self, trace: Trace, *, seed: int = 0) -> RegistrationResult:
+        """The verdict on a traced run, and its result in the coordinates that the user gave."""
+        pair = trace.scene.pair
         with stopwatch(trace.seconds, "verdict"):
             from hybridreg.verdict import judge
 

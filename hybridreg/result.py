@@ -104,7 +104,9 @@ class RegistrationResult:
         elif os.fspath(path).endswith(".json"):
             write_json(path, self.to_dict())
         else:
-            raise ValueError(f"{os.fspath(path)}: a result is saved as .json (everything) or .txt (the 4x4 matrix)")
+            raise ValueError(
+                f"{os.fspath(path)}: a result is saved as .json (everything) or .txt (the 4x4 matrix)"
+            )
 
 
 def _plain(value: Any) -> Any:

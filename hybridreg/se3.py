@@ -109,7 +109,9 @@ def check(T: Any, name: str = "T", tolerance: float = 1e-4) -> Array:
     if not np.isfinite(matrix).all():
         raise ValueError(f"{name}: the matrix is not finite")
     if not np.allclose(matrix[3], [0, 0, 0, 1], atol=1e-9):
-        raise ValueError(f"{name}: the last row is {matrix[3]}, expected [0 0 0 1]; is the matrix transposed?")
+        raise ValueError(
+            f"{name}: the last row is {matrix[3]}, expected [0 0 0 1]; is the matrix transposed?"
+        )
     error = float(np.abs(matrix[:3, :3] @ matrix[:3, :3].T - np.eye(3)).max())
     if error > tolerance or np.linalg.det(matrix[:3, :3]) < 0:
         raise ValueError(

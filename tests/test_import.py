@@ -13,7 +13,18 @@ import pytest
 import hybridreg
 
 ROOT = Path(__file__).resolve().parent.parent
-HEAVY = {"torch", "open3d", "sklearn", "cv2", "small_gicp", "kiss_matcher", "kiss_icp", "matplotlib", "plotly", "typer"}
+HEAVY = {
+    "torch",
+    "open3d",
+    "sklearn",
+    "cv2",
+    "small_gicp",
+    "kiss_matcher",
+    "kiss_icp",
+    "matplotlib",
+    "plotly",
+    "typer",
+}
 
 
 def run(code: str, *flags: str) -> str:
@@ -24,9 +35,13 @@ def run(code: str, *flags: str) -> str:
     return done.stdout
 
 
-@pytest.mark.parametrize("module", ["hybridreg", "hybridreg.pipeline", "hybridreg.eval", "hybridreg.classical"])
+@pytest.mark.parametrize(
+    "module", ["hybridreg", "hybridreg.pipeline", "hybridreg.eval", "hybridreg.classical"]
+)
 def test_import_loads_nothing_heavy_and_warns_of_nothing(module: str) -> None:
-    loaded = json.loads(run(f"import json, sys, {module}; print(json.dumps(list(sys.modules)))", "-W", "error"))
+    loaded = json.loads(
+        run(f"import json, sys, {module}; print(json.dumps(list(sys.modules)))", "-W", "error")
+    )
     assert not HEAVY & {name.partition(".")[0] for name in loaded}
 
 
@@ -38,7 +53,15 @@ def test_every_public_name_exists() -> None:
 
 
 def test_public_names_did_not_vanish() -> None:
-    promised = {"register", "Pipeline", "PointCloud", "Pair", "LabelledPair", "RegistrationResult", "VoxelGrid"}
+    promised = {
+        "register",
+        "Pipeline",
+        "PointCloud",
+        "Pair",
+        "LabelledPair",
+        "RegistrationResult",
+        "VoxelGrid",
+    }
     assert promised <= set(hybridreg.__all__)
 
 

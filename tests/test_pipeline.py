@@ -72,7 +72,9 @@ def test_rotation_is_made_proper(courtyard: tuple[hr.Pair, np.ndarray]) -> None:
 
 
 @pytest.mark.parametrize("bad", [np.full((4, 4), np.nan), np.eye(3)])
-def test_a_pose_that_is_none_is_a_failure_not_a_crash(courtyard: tuple[hr.Pair, np.ndarray], bad: np.ndarray) -> None:
+def test_a_pose_that_is_none_is_a_failure_not_a_crash(
+    courtyard: tuple[hr.Pair, np.ndarray], bad: np.ndarray
+) -> None:
     result = identity(estimate=lambda scene, matches, rng: Pose(bad), voxel=0.5).run(courtyard[0])
     assert result.verdict == "failed"
     assert np.array_equal(result.transformation, np.eye(4))

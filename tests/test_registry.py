@@ -13,7 +13,7 @@ from hybridreg.slots import SLOTS
 
 ROOT = Path(__file__).resolve().parent.parent
 
-PLUGIN = '''
+PLUGIN = """
 from dataclasses import dataclass
 import numpy as np
 from hybridreg.matches import Correspondences
@@ -24,7 +24,7 @@ class Mine:
     gives = frozenset({"matches"})
     def __call__(self, scene, overlap):
         return Correspondences.of(scene.source.points[:self.n], scene.target.points[:self.n])
-'''
+"""
 
 USE = """
 import hybridreg as hr
@@ -60,14 +60,26 @@ def test_a_second_package_plugs_in(tmp_path: Path) -> None:
         info = "mine-1.0.dist-info"
         z.writestr("mine.py", PLUGIN)
         z.writestr(f"{info}/METADATA", "Metadata-Version: 2.1\nName: mine\nVersion: 1.0\n")
-        z.writestr(f"{info}/WHEEL", "Wheel-Version: 1.0\nGenerator: test\nRoot-Is-Purelib: true\nTag: py3-none-any\n")
+        z.writestr(
+            f"{info}/WHEEL", "Wheel-Version: 1.0\nGenerator: test\nRoot-Is-Purelib: true\nTag: py3-none-any\n"
+        )
         # The second line tries to take a built-in's name; a pipeline file must mean the same everywhere.
         z.writestr(
             f"{info}/entry_points.txt", "[hybridreg.stages]\nmatch.mine = mine:Mine\nmatch.fpfh = mine:Mine\n"
         )
         z.writestr(f"{info}/RECORD", "")
     site = tmp_path / "site"
-    pip = [sys.executable, "-m", "pip", "install", "--quiet", "--no-deps", "--no-index", "--target", str(site)]
+    pip = [
+        sys.executable,
+        "-m",
+        "pip",
+        "install",
+        "--quiet",
+        "--no-deps",
+        "--no-index",
+        "--target",
+        str(site),
+    ]
     subprocess.run([*pip, str(wheel)], check=True, capture_output=True)
     checked = USE + 'assert registry.load("match", "fpfh").__name__ == "Fpfh"\n'
     done = subprocess.run(

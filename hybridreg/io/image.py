@@ -84,7 +84,7 @@ def as_image(image: ArrayLike, name: str = "image") -> NDArray[np.uint8]:
 
 def _check_shape(pixels: NDArray[Any], name: str) -> None:
     shape = pixels.shape
-    if pixels.ndim == 3 and shape[2] not in (1, 3, 4) and shape[0] in (1, 3, 4):
+    if pixels.ndim == 3 and shape[2] > 4 and shape[0] in (1, 3, 4):
         cure = "put the channels last: numpy.moveaxis(image, 0, -1)"
         raise fault(name, f"has the shape {shape}, channels first", cure)
     if pixels.ndim != 3 or shape[2] not in (1, 3, 4):

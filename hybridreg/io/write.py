@@ -9,16 +9,17 @@ from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from hybridreg.io.atomic import write_bytes, write_text
 from hybridreg.io.faults import fault
 
 _PLY_TYPES = {"float64": "double", "float32": "float"}
+_MOST_ROUNDING = 1e-3  # metres, below the noise of any LiDAR
 
 
 def write_points(
-    path: str | os.PathLike[str], points: ArrayLike, *, dtype: Literal["float64", "float32"] = "float64"
+    path: str | os.PathLike[str], points: ArrayLike, *, dtype: Literal["float64", "float32"] | None = None
 ) -> None:
     """Write a cloud as binary PLY or binary PCD, by the name's ending.
 
@@ -28,30 +29,31 @@ def write_points(
         Ends in `.ply` or `.pcd`.
     points : array of shape (N, 3)
         Written as they are, also where they are not finite.
-    dtype : {"float64", "float32"}
-        float64 loses nothing. Some programs (PCL's `PointXYZ`) read float32 only, which keeps millimetres up
-        to 16 km from the origin.
+    dtype : {"float64", "float32"}, optional
+        By default PLY is written as float64, which loses nothing, and PCD as float32, because Open3D reads
+        the coordinates of a float64 PCD as zeros without a word. A PCD whose points float32 would move by
+        more than a millimetre (map-grid coordinates) is refused unless a dtype is given.
 
     Raises
     ------
     ValueError
-        Another ending, or points of another shape.
+        Another ending, points of another shape, or map-grid coordinates in a PCD without `dtype`.
     """
-    array = np.asarray(points)
+    array, suffix = np.asarray(points), Path(path).suffix.lower()
     if array.ndim != 2 or array.shape[1] != 3 or array.dtype.kind not in "fiu":
         problem = f"the points to write have the shape {array.shape} and the dtype {array.dtype}"
         raise fault(str(path), problem, "give real numbers of shape (N, 3)")
-    if dtype not in _PLY_TYPES:
-        raise fault(
-            str(path), f"points cannot be written as {dtype!r}", f"choose from {', '.join(_PLY_TYPES)}"
-        )
-    suffix = Path(path).suffix.lower()
     if suffix not in (".ply", ".pcd"):
         raise fault(
             str(path), f"clouds are not written as {suffix!r}", "choose a name ending in .ply or .pcd"
         )
-    header = _ply_header(len(array), dtype) if suffix == ".ply" else _pcd_header(len(array), dtype)
-    write_bytes(path, header.encode("ascii") + array.astype(np.dtype(dtype).newbyteorder("<")).tobytes())
+    kind = dtype or ("float64" if suffix == ".ply" else _checked_float32(array, str(path)))
+    if kind not in _PLY_TYPES:
+        raise fault(
+            str(path), f"points cannot be written as {kind!r}", f"choose from {', '.join(_PLY_TYPES)}"
+        )
+    header = _ply_header(len(array), kind) if suffix == ".ply" else _pcd_header(len(array), kind)
+    write_bytes(path, header.encode("ascii") + _little_endian(array, kind))
 
 
 def write_matrix(path: str | os.PathLike[str], matrix: ArrayLike) -> None:
@@ -95,6 +97,21 @@ def _plain(thing: object) -> Any:
     if isinstance(thing, os.PathLike):
         return os.fspath(thing)
     raise TypeError(f"an object of type {type(thing).__name__}")
+
+
+def _checked_float32(points: NDArray[Any], name: str) -> str:
+    finite = points[np.isfinite(points)].astype(np.float64)
+    with np.errstate(over="ignore"):
+        moved = np.abs(finite.astype(np.float32) - finite)
+    if (moved > _MOST_ROUNDING).any():
+        problem = f"float32 would move coordinates of up to {np.abs(finite).max():g} by {moved.max():.3g} m"
+        raise fault(name, problem, "write .ply, subtract an offset, or ask for a dtype")
+    return "float32"
+
+
+def _little_endian(points: NDArray[Any], dtype: str) -> bytes:
+    with np.errstate(over="ignore"):  # beyond float32's range, on request: infinity
+        return points.astype(np.dtype(dtype).newbyteorder("<")).tobytes()
 
 
 def _ply_header(count: int, dtype: str) -> str:

@@ -77,5 +77,7 @@ def _slots(text: str, origin: str) -> dict[str, Any]:
         raise ValueError(f"{origin}: not a TOML file ({error})") from error
     unknown = set(tables) - {*SLOTS, "voxel"}
     if unknown:
-        raise ValueError(f"{origin}: {', '.join(sorted(unknown))} is no slot; the slots are {', '.join(SLOTS)}")
+        raise ValueError(
+            f"{origin}: {', '.join(sorted(unknown))} is no slot; the slots are {', '.join(SLOTS)}"
+        )
     return tables

@@ -71,7 +71,11 @@ print("survived", pose.found)
 def test_no_crash_reaches_the_user(kind: str, n: int) -> None:
     """In a process of its own: what is guarded against here is a segmentation fault of the wheel."""
     done = subprocess.run(
-        [sys.executable, "-c", HOSTILE, kind, "0", str(n)], cwd=ROOT, capture_output=True, text=True, check=False
+        [sys.executable, "-c", HOSTILE, kind, "0", str(n)],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=False,
     )
     assert done.returncode == 0, done.stderr
     assert "survived" in done.stdout

@@ -98,7 +98,9 @@ def _text(cloud: np.ndarray) -> dict[str, bytes]:
     rows = cloud.tolist()
     return {
         "plain.xyz": "".join(f"{x!r} {y!r} {z!r}\n" for x, y, z in rows).encode(),
-        "commented.txt": ("// made by hand\n" + "".join(f"{x!r}\t{y!r}\t{z!r}\n" for x, y, z in rows)).encode(),
+        "commented.txt": (
+            "// made by hand\n" + "".join(f"{x!r}\t{y!r}\t{z!r}\n" for x, y, z in rows)
+        ).encode(),
         "named.csv": ("id,z,x,y\n" + "".join(f"a,{z!r},{x!r},{y!r}\n" for x, y, z in rows)).encode(),
     }
 
@@ -135,7 +137,9 @@ def samples(cloud: np.ndarray) -> dict[str, bytes]:
 def real_data() -> Path:
     import os
 
-    folder = Path(os.environ.get("HYBRIDREG_DATA", Path(__file__).parents[2] / ".." / "shared" / "data" / "real"))
+    folder = Path(
+        os.environ.get("HYBRIDREG_DATA", Path(__file__).parents[2] / ".." / "shared" / "data" / "real")
+    )
     if not folder.is_dir():
         pytest.skip(f"no real data at {folder}")
     return folder

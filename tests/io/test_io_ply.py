@@ -34,7 +34,11 @@ def layouts(draw):
     for index in range(draw(st.integers(0, 2))):
         fields = [(*extra, f"q{place}") for place, extra in enumerate(draw(extras))]
         elements.append((f"other{index}", draw(st.integers(0, 4)), fields))
-    return draw(st.sampled_from(sorted(FORMATS))), draw(st.permutations(elements)), draw(st.integers(0, 2**32))
+    return (
+        draw(st.sampled_from(sorted(FORMATS))),
+        draw(st.permutations(elements)),
+        draw(st.integers(0, 2**32)),
+    )
 
 
 def written(word, elements, seed):
@@ -61,7 +65,7 @@ def written(word, elements, seed):
     return header(*lines, word=word) + b"".join(body), np.array(points, dtype=np.float64).reshape(-1, 3)
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=80, deadline=None)
 @given(layouts())
 def test_any_layout_is_read(layout):
     data, points = written(*layout)
@@ -70,13 +74,17 @@ def test_any_layout_is_read(layout):
 
 @pytest.mark.parametrize("word, order", list(FORMATS.items())[1:])
 def test_doubles_survive_in_binary(word, order, utm_cloud):
-    head = header(f"element vertex {len(utm_cloud)}", *[f"property double {axis}" for axis in "xyz"], word=word)
+    head = header(
+        f"element vertex {len(utm_cloud)}", *[f"property double {axis}" for axis in "xyz"], word=word
+    )
     data = head + utm_cloud.astype(order + "f8").tobytes()
     np.testing.assert_array_equal(parse_ply(data, "a.ply"), utm_cloud)
 
 
 def test_doubles_survive_in_text(utm_cloud):
-    head = header(f"element vertex {len(utm_cloud)}", *[f"property double {axis}" for axis in "xyz"], word="ascii")
+    head = header(
+        f"element vertex {len(utm_cloud)}", *[f"property double {axis}" for axis in "xyz"], word="ascii"
+    )
     rows = "".join(f"{x!r} {y!r} {z!r}\n" for x, y, z in utm_cloud.tolist())
     np.testing.assert_array_equal(parse_ply(head + rows.encode(), "a.ply"), utm_cloud)
 
@@ -103,8 +111,8 @@ def test_signalling_nan_gives_no_warning():
 
 
 def test_capital_names_and_no_vertices():
-    assert parse_ply(header("element vertex 0", AXES.upper().replace("PROPERTY FLOAT", "property float").rstrip()),
-                     "a.ply").shape == (0, 3)  # fmt: skip
+    axes = [f"property float {axis}" for axis in "XYZ"]
+    assert parse_ply(header("element vertex 0", *axes), "a.ply").shape == (0, 3)
 
 
 def test_truncated_binary_names_the_numbers():
@@ -156,7 +164,7 @@ BAD_HEADERS = {
     "no element 'vertex', only face": header("element face 0"),
     "0 fields called 'z'": header("element vertex 1", "property float x", "property float y"),
     "2 fields called 'x'": header("element vertex 1", "property float x", AXES.rstrip()),
-    "is a list": header("element vertex 1", "property list uchar int x", "property float y", "property float z"),
+    "is a list": header("element vertex 1", "property list int int x", "property int y", "property int z"),
     "1000000000000 rows of 'face'": header(FACES.rstrip(), "element vertex 1", AXES.rstrip()) + bytes(100),
     "up to byte": header("element b 1000000000000", "property int q", "element vertex 1", AXES.rstrip()),
     "length -1": header("element face 1", "property list char int c", "element vertex 1", AXES.rstrip())

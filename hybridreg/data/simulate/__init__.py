@@ -5,14 +5,14 @@
 >>> labelled = next(simulate.pairs(tier="mid", seed=1))
 """
 
-from .drawn import Drawn, draw
-from .folder import read_pair, write_pair, write_pairs
-from .labelled import pair, pairs, to_labelled
-from .overlaps import overlap
-from .scenes import SCENES
-from .sensors import SENSORS, Sensor
-from .splits import SPLITS, VERSION, pair_number
-from .tiers import TIERS, Tier
+from hybridreg.data.simulate.drawn import Drawn, draw
+from hybridreg.data.simulate.folder import read_pair, write_pair, write_pairs
+from hybridreg.data.simulate.labelled import pair, pairs, to_labelled
+from hybridreg.data.simulate.overlaps import overlap
+from hybridreg.data.simulate.scenes import SCENES
+from hybridreg.data.simulate.sensors import SENSORS, Sensor
+from hybridreg.data.simulate.splits import SPLITS, VERSION, pair_number
+from hybridreg.data.simulate.tiers import TIERS, Tier
 
 __all__ = [
     "SCENES",
@@ -24,12 +24,12 @@ __all__ = [
     "Sensor",
     "Tier",
     "draw",
-    "to_labelled",
     "overlap",
     "pair",
     "pair_number",
     "pairs",
     "read_pair",
+    "to_labelled",
     "write_pair",
     "write_pairs",
 ]

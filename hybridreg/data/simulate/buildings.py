@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .mesh import Mesh, Tint
-from .solids import boxes, loft, quads
+from hybridreg.data.simulate.mesh import Mesh, Tint
+from hybridreg.data.simulate.solids import boxes, loft, quads
 
 # One window cell on 12 corners: 0-3 the cell, 4-7 the hole in the wall, 8-11 the pane behind it.
 _WALL = [[0, 1, 5], [0, 5, 4], [1, 2, 6], [1, 6, 5], [2, 3, 7], [2, 7, 6], [3, 0, 4], [3, 4, 7]]
@@ -61,12 +61,23 @@ def _cells(style: Style, length: float, height: float, rng: np.random.Generator)
     left, bottom = (g.ravel() for g in np.meshgrid(u[:-1], z[:-1], indexing="ij"))
     width, storey = length / across, height / up
     ground = bottom < 0.1
-    share_u = np.where(ground & style.shop, 0.85, style.window[0]) * np.where(rng.random(len(left)) < 0.06, 0.6, 1)
+    share_u = np.where(ground & style.shop, 0.85, style.window[0]) * np.where(
+        rng.random(len(left)) < 0.06, 0.6, 1
+    )
     share_z = np.where(ground & style.shop, 0.75, style.window[1])
     middle = left + width / 2
     sill = bottom + np.where(ground & style.shop, 0.1, 0.3) * storey
     top = np.minimum(sill + share_z * storey, bottom + 0.95 * storey)
-    return left, left + width, bottom, bottom + storey, middle - share_u * width / 2, middle + share_u * width / 2, sill, top
+    return (
+        left,
+        left + width,
+        bottom,
+        bottom + storey,
+        middle - share_u * width / 2,
+        middle + share_u * width / 2,
+        sill,
+        top,
+    )
 
 
 def facade(
@@ -102,7 +113,12 @@ def _panes(vertices: np.ndarray, faces: np.ndarray, tint: np.ndarray, rng: np.ra
     covered = rng.random(len(faces)) < 0.35
     return [
         Mesh.of(vertices, faces[~covered].reshape(-1, 3), "glass", tint),
-        Mesh.of(vertices, faces[covered].reshape(-1, 3), "plaster", (rng.uniform(0.55, 0.9) * np.array([1.0, 0.97, 0.92]))),
+        Mesh.of(
+            vertices,
+            faces[covered].reshape(-1, 3),
+            "plaster",
+            (rng.uniform(0.55, 0.9) * np.array([1.0, 0.97, 0.92])),
+        ),
     ]
 
 
@@ -132,11 +148,15 @@ def _relief(
     if style.pillars:
         u = np.linspace(0.3, length - 0.3, max(2, int(length / (2 * style.cell))))
         xy = start + u[:, None] * along + 0.15 * out
-        parts.append(boxes(np.c_[xy, np.full(len(u), base)], np.array([0.5, 0.35, height]), yaw, "concrete", dark))
+        parts.append(
+            boxes(np.c_[xy, np.full(len(u), base)], np.array([0.5, 0.35, height]), yaw, "concrete", dark)
+        )
     middle = start + 0.5 * length * along + 0.12 * out
     ledges = base + np.array([min(style.storey, height * 0.5), height - 0.35])
     parts.append(
-        boxes(np.c_[np.tile(middle, (2, 1)), ledges], np.array([length, 0.3, 0.25]), yaw, style.material, dark)
+        boxes(
+            np.c_[np.tile(middle, (2, 1)), ledges], np.array([length, 0.3, 0.25]), yaw, style.material, dark
+        )
     )
     return parts
 

@@ -9,12 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from .caster import Hits, World
-from .layout import Surface
-from .light import Light
-from .materials import GLOSS
-from .scan import with_ground
-from .texture import shade_factor
+from hybridreg.data.simulate.caster import Hits, World
+from hybridreg.data.simulate.layout import Surface
+from hybridreg.data.simulate.light import Light
+from hybridreg.data.simulate.materials import GLOSS
+from hybridreg.data.simulate.scan import with_ground
+from hybridreg.data.simulate.texture import shade_factor
 
 WIDTH, HEIGHT = 512, 288
 
@@ -74,7 +74,10 @@ def _surfaces(world: World, origin: np.ndarray, rays: np.ndarray, hits: Hits, li
     gloss = GLOSS[hits.material]
     shiny = np.flatnonzero(gloss > 0)
     if len(shiny):
-        away = rays[shiny] - 2 * np.sum(rays[shiny] * hits.normal[shiny], axis=1, keepdims=True) * hits.normal[shiny]
+        away = (
+            rays[shiny]
+            - 2 * np.sum(rays[shiny] * hits.normal[shiny], axis=1, keepdims=True) * hits.normal[shiny]
+        )
         colour[shiny] += gloss[shiny, None] * (light.sky(away) - colour[shiny])
     haze = 1 - np.exp(-hits.distance / light.visibility)[:, None]
     return colour + haze * (light.horizon - colour)

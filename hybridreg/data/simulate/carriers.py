@@ -9,12 +9,11 @@ from functools import partial
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from .cars import SHAPES, car
-from .layout import Layout
-from .mesh import EMPTY, Mesh
-from .pool import one_of
-from .solids import boxes, ellipsoid, tubes
-
+from hybridreg.data.simulate.cars import SHAPES, car
+from hybridreg.data.simulate.layout import Layout
+from hybridreg.data.simulate.mesh import EMPTY, Mesh
+from hybridreg.data.simulate.pool import one_of
+from hybridreg.data.simulate.solids import boxes, ellipsoid, tubes
 
 CARS = {kind: partial(car, kind=kind) for kind in ("hatchback", "estate", "suv")}
 
@@ -43,8 +42,17 @@ def carrier_named(kind: str, rng: np.random.Generator) -> Carrier:
         return Carrier(body, SHAPES[shape].size[2] * 1.05 + lift, 1.6)
     if kind == "robot":
         height = rng.uniform(0.7, 1.3)
-        chassis = boxes(np.array([[-0.1, 0, 0.15]]), np.array([0.9, 0.6, 0.35]), 0.0, "paint", (0.6, 0.5, 0.1))
-        mast = tubes(np.array([[-0.05, 0, 0.4]]), np.array([[-0.05, 0, height - 0.12]]), 0.04, 0.04, "metal", (0.3,) * 3)
+        chassis = boxes(
+            np.array([[-0.1, 0, 0.15]]), np.array([0.9, 0.6, 0.35]), 0.0, "paint", (0.6, 0.5, 0.1)
+        )
+        mast = tubes(
+            np.array([[-0.05, 0, 0.4]]),
+            np.array([[-0.05, 0, height - 0.12]]),
+            0.04,
+            0.04,
+            "metal",
+            (0.3,) * 3,
+        )
         return Carrier(Mesh.merge([chassis, mast]), height, 0.8)
     if rng.random() < 0.5:
         return Carrier(EMPTY, rng.uniform(1.3, 1.8), 0.5)
@@ -52,7 +60,9 @@ def carrier_named(kind: str, rng: np.random.Generator) -> Carrier:
     return Carrier(head, rng.uniform(1.6, 1.9), 0.5)
 
 
-def mount(layout: Layout, carrier: Carrier, xy: np.ndarray, yaw: float, rng: np.random.Generator) -> np.ndarray:
+def mount(
+    layout: Layout, carrier: Carrier, xy: np.ndarray, yaw: float, rng: np.random.Generator
+) -> np.ndarray:
     """T_world_sensor (4,4) of a sensor on `carrier` at `xy`, looking along `yaw`, tilted by a degree or two."""
     T = np.eye(4)
     tilt = rng.normal(0, 0.025, 2)

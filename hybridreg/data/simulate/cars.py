@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .mesh import Mesh
-from .solids import boxes, loft, tubes
+from hybridreg.data.simulate.mesh import Mesh
+from hybridreg.data.simulate.solids import boxes, loft, tubes
 
 _COLOURS = np.array(
     [[.9, .9, .9], [.75, .76, .78], [.12, .12, .13], [.3, .31, .33], [.6, .1, .1], [.12, .2, .42], [.2, .3, .25],
@@ -50,12 +50,19 @@ def car(rng: np.random.Generator, kind: str | None = None) -> Mesh:
     paint = "dark_paint" if colour.mean() < 0.2 else "paint"
     clear = 0.14 * height
     lower = _body(np.array(shape.belt), length, height, clear, (0.94 * width, width, 0.93 * width))
-    cabin = _body(np.array(shape.cabin), length, height, 0.55 * height, (0.9 * width, 0.88 * width, 0.7 * width))
+    cabin = _body(
+        np.array(shape.cabin), length, height, 0.55 * height, (0.9 * width, 0.88 * width, 0.7 * width)
+    )
     roof = np.array(shape.cabin)[1:3]
     top = np.array([[(0.5 - roof.mean(0)[0]) * length, 0, roof[:, 1].min() * height - 0.04]])
     panel = boxes(top, np.array([(roof[1, 0] - roof[0, 0]) * length, 0.72 * width, 0.06]), 0.0, paint, colour)
     return Mesh.merge(
-        [loft(lower, paint, colour), loft(cabin, "glass", (0.13, 0.15, 0.17)), panel, _wheels(length, width, 0.32)]
+        [
+            loft(lower, paint, colour),
+            loft(cabin, "glass", (0.13, 0.15, 0.17)),
+            panel,
+            _wheels(length, width, 0.32),
+        ]
     )
 
 

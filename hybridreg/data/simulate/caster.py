@@ -9,8 +9,8 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from .mesh import Mesh
-from .solids import cross
+from hybridreg.data.simulate.mesh import Mesh
+from hybridreg.data.simulate.solids import cross
 
 
 @dataclass(frozen=True)
@@ -58,7 +58,9 @@ class Open3dCaster:
 
         self._core = load_open3d().core
         self._scene = load_open3d().t.geometry.RaycastingScene(nthreads=1)
-        self._scene.add_triangles(self._core.Tensor(mesh.vertices), self._core.Tensor(mesh.faces.astype(np.uint32)))
+        self._scene.add_triangles(
+            self._core.Tensor(mesh.vertices), self._core.Tensor(mesh.faces.astype(np.uint32))
+        )
 
     def cast(self, origins: np.ndarray, directions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """See `Caster.cast`."""
@@ -126,12 +128,16 @@ class World:
         normal[away] *= -1
         return Hits(distance, normal, self._material[face], self._tint[face])
 
-    def visible(self, origins: np.ndarray, directions: np.ndarray, up_to: np.ndarray | float) -> NDArray[np.bool_]:
+    def visible(
+        self, origins: np.ndarray, directions: np.ndarray, up_to: np.ndarray | float
+    ) -> NDArray[np.bool_]:
         """Whether nothing stands within `up_to` metres along each ray."""
         free = np.ones(len(directions), bool)
         origins = _starts(origins, directions)
         for caster in self._casters:
-            free[free] = caster.cast(origins[free], directions[free])[0] >= np.broadcast_to(up_to, free.shape)[free]
+            free[free] = (
+                caster.cast(origins[free], directions[free])[0] >= np.broadcast_to(up_to, free.shape)[free]
+            )
         return free
 
 

@@ -9,19 +9,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybridreg import se3
-
-from .camera import Camera, photograph
-from .caster import Part, World
-from .layout import Layout
-from .light import Light
-from .mesh import Mesh
-from .overlaps import overlap, thin
-from .scan import scan
-from .scenes import SCENES
-from .sensors import SENSORS, SOURCE_SENSORS, TARGET_SENSORS, Sensor
-from .splits import VERSION
-from .stands import Stand, choose_stands, single_stand
-from .tiers import TIERS, Tier, tier_named
+from hybridreg.data.simulate.camera import Camera, photograph
+from hybridreg.data.simulate.caster import Part, World
+from hybridreg.data.simulate.jpeg import encode
+from hybridreg.data.simulate.layout import Layout
+from hybridreg.data.simulate.light import Light
+from hybridreg.data.simulate.mesh import Mesh
+from hybridreg.data.simulate.overlaps import overlap, thin
+from hybridreg.data.simulate.scan import scan
+from hybridreg.data.simulate.scenes import SCENES
+from hybridreg.data.simulate.sensors import SENSORS, SOURCE_SENSORS, TARGET_SENSORS, Sensor
+from hybridreg.data.simulate.splits import VERSION
+from hybridreg.data.simulate.stands import Stand, choose_stands, single_stand
+from hybridreg.data.simulate.tiers import TIERS, Tier, tier_named
 
 ATTEMPTS = 4
 
@@ -136,9 +136,6 @@ def _disjoint(tier: Tier, sensors: tuple[Sensor, Sensor], streams: _Streams) -> 
 
 def _picture(world: World, layout: Layout, T_world_source: np.ndarray, rng: np.random.Generator) -> bytes:
     """JPEG, as cameras deliver it; drawn pictures pass through it too, so that files read back identically."""
-    import cv2
-
     camera = Camera.near(T_world_source, rng)
     picture = photograph(world, layout.surface, camera, Light.draw(rng), rng)
-    quality = int(rng.integers(72, 93))
-    return bytes(cv2.imencode(".jpg", picture[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, quality])[1])
+    return encode(picture, int(rng.integers(72, 93)))

@@ -14,18 +14,19 @@ from uuid import uuid4
 import numpy as np
 
 from hybridreg.cloud import PointCloud
+from hybridreg.data.simulate.drawn import Drawn, draw
+from hybridreg.data.simulate.jpeg import decode
+from hybridreg.data.simulate.labelled import pair_id
+from hybridreg.data.simulate.overlaps import thin
+from hybridreg.data.simulate.splits import VERSION, pair_number
 from hybridreg.pair import LabelledPair, Pair
-
-from .drawn import Drawn, draw
-from .labelled import pair_id
-from .overlaps import thin
-from .splits import VERSION, pair_number
 
 
 def write_pair(folder: Path, drawn: Drawn, facts: dict[str, Any], voxel: float | None) -> Path:
     """One pair as `folder`: source.npz, target.npz, image.jpg, meta.json. The folder appears whole or not at all.
 
-    Coordinates lie on a grid of 1/256 m, so their float32 numbers end in zero bits and compress to about a half (thinned clouds lie in the order of their cubes: less still).
+    Coordinates lie on a grid of 1/256 m, so their float32 numbers end in zero bits and compress to about a half;
+    thinned clouds lie in the order of their cubes and compress better still.
     """
     part = folder.with_name(f".{folder.name}-{uuid4().hex[:8]}")
     part.mkdir(parents=True)
@@ -64,19 +65,16 @@ def read_pair(folder: Path) -> LabelledPair:
     FileNotFoundError
         Where one of its four files is missing.
     """
-    import cv2
-
     meta = json.loads((folder / "meta.json").read_text())
     clouds = []
     for name in ("source", "target"):
         with np.load(folder / f"{name}.npz") as stored:
             points = np.ascontiguousarray(stored["xyz"])
         clouds.append(PointCloud.of(points, name=f"{folder.name} {name}", sensor=meta[f"{name}_sensor"]))
-    picture = cv2.imdecode(np.frombuffer((folder / "image.jpg").read_bytes(), np.uint8), cv2.IMREAD_COLOR)
     pair = Pair(
         source=clouds[0],
         target=clouds[1],
-        image=np.ascontiguousarray(picture[..., ::-1]),
+        image=decode((folder / "image.jpg").read_bytes()),
         id=meta["id"],
         meta={"scene": meta["scene"], "version": meta["version"]},
     )
@@ -87,7 +85,13 @@ def write_one(out: Path, tier: str, split: str, seed: int, index: int, voxel: fl
     """Draw pair `index` and write it below `out`; a pair that lies there whole already is kept."""
     folder = out / f"{tier}-{split}-{seed}-{index:06d}"
     if not (folder / "meta.json").is_file():
-        facts = {"tier": tier, "split": split, "seed": seed, "index": index, "id": pair_id(split, tier, seed, index)}
+        facts = {
+            "tier": tier,
+            "split": split,
+            "seed": seed,
+            "index": index,
+            "id": pair_id(split, tier, seed, index),
+        }
         write_pair(folder, draw(tier, pair_number(split, seed, index)), facts, voxel)
     return folder
 

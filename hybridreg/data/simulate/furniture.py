@@ -5,8 +5,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from .mesh import Mesh
-from .solids import boxes, cards, quads, tubes
+from hybridreg.data.simulate.mesh import Mesh
+from hybridreg.data.simulate.solids import boxes, cards, quads, tubes
 
 GREY = (0.45, 0.46, 0.47)
 
@@ -53,7 +53,9 @@ def traffic_light(rng: np.random.Generator) -> Mesh:
     """A signal mast with its heads."""
     h = rng.uniform(3.0, 5.5)
     pole = tubes(np.zeros((1, 3)), np.array([[0, 0, h]]), 0.08, 0.06, "metal", (0.2, 0.25, 0.22))
-    heads = boxes(np.array([[0.15, 0, h - 0.9], [0, 0.2, 2.1]]), np.array([0.25, 0.3, 0.85]), 0.0, "metal", (0.08,) * 3)
+    heads = boxes(
+        np.array([[0.15, 0, h - 0.9], [0, 0.2, 2.1]]), np.array([0.25, 0.3, 0.85]), 0.0, "metal", (0.08,) * 3
+    )
     return Mesh.merge([pole, heads])
 
 
@@ -88,7 +90,8 @@ def wall(rng: np.random.Generator, points: np.ndarray, height: float) -> Mesh:
     yaw = np.arctan2(*(end - start)[:, [1, 0]].T)
     low = np.minimum(start[:, 2], end[:, 2]) - 0.3
     body = boxes(
-        np.c_[(start + end)[:, :2] / 2, low], np.c_[length, np.full(len(length), 0.25), np.full(len(length), height + 0.3)],
+        np.c_[(start + end)[:, :2] / 2, low],
+        np.c_[length, np.full(len(length), 0.25), np.full(len(length), height + 0.3)],
         yaw, material, tint,
     )  # fmt: skip
     piers = boxes(points - [0, 0, 0.3], np.array([0.45, 0.45, height + 0.45]), yaw[0], material, tint * 0.9)
@@ -150,5 +153,11 @@ def scaffold(rng: np.random.Generator, length: float) -> Mesh:
     y = np.tile([0.0, 1.0], 3)
     rail = np.c_[np.full(6, -length / 2), y, z]
     rails = tubes(rail, rail + [length, 0, 0], 0.03, 0.03, "metal", GREY, 4)
-    decks = boxes(np.array([[0, 0.5, 1.95], [0, 0.5, 3.95]]), np.array([length, 0.9, 0.06]), 0.0, "wood", (0.5, 0.4, 0.3))
+    decks = boxes(
+        np.array([[0, 0.5, 1.95], [0, 0.5, 3.95]]),
+        np.array([length, 0.9, 0.06]),
+        0.0,
+        "wood",
+        (0.5, 0.4, 0.3),
+    )
     return Mesh.merge([uprights, rails, decks])

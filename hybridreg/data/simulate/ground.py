@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .mesh import Mesh
+from hybridreg.data.simulate.mesh import Mesh
 
 EXTENT = 130.0  # metres from the centre to the rim of every scene
 _AXIS = np.concatenate(
@@ -36,7 +36,11 @@ class Terrain:
         """Metres above the datum at `x`, `y` (any one shape)."""
         x, y = np.asarray(x, float)[..., None], np.asarray(y, float)[..., None]
         a, kx, ky, phase = self.wave.T
-        return self.slope[0] * x[..., 0] + self.slope[1] * y[..., 0] + (a * np.sin(kx * x + ky * y + phase)).sum(-1)
+        return (
+            self.slope[0] * x[..., 0]
+            + self.slope[1] * y[..., 0]
+            + (a * np.sin(kx * x + ky * y + phase)).sum(-1)
+        )
 
     def mesh(self, rng: np.random.Generator, bumps: float) -> Mesh:
         """Triangles out to the rim, fine near the centre, with `bumps` metres of small unevenness.

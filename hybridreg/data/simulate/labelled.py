@@ -6,27 +6,22 @@ from __future__ import annotations
 from collections.abc import Iterator
 from itertools import count
 
-import numpy as np
-
 from hybridreg.cloud import PointCloud
+from hybridreg.data.simulate.drawn import Drawn, draw
+from hybridreg.data.simulate.jpeg import decode
+from hybridreg.data.simulate.overlaps import thin
+from hybridreg.data.simulate.sensors import Sensor
+from hybridreg.data.simulate.splits import VERSION, pair_number
 from hybridreg.pair import LabelledPair, Pair
-
-from .drawn import Drawn, draw
-from .overlaps import thin
-from .sensors import Sensor
-from .splits import VERSION, pair_number
 
 
 def to_labelled(drawn: Drawn, id: str, voxel: float | None = None) -> LabelledPair:
     """`drawn` with its picture decoded; `voxel` thins the clouds to one measured point per cube of that edge."""
-    import cv2
-
-    picture = cv2.imdecode(np.frombuffer(drawn.jpeg, np.uint8), cv2.IMREAD_COLOR)
     clouds = [cloud if voxel is None else thin(cloud, voxel) for cloud in (drawn.source, drawn.target)]
     pair = Pair(
         source=PointCloud.of(clouds[0], name=f"{id} source", sensor=drawn.source_sensor),
         target=PointCloud.of(clouds[1], name=f"{id} target", sensor=drawn.target_sensor),
-        image=np.ascontiguousarray(picture[..., ::-1]),
+        image=decode(drawn.jpeg),
         id=id,
         meta={"scene": drawn.scene, "version": VERSION},
     )

@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from .ground import Terrain
-from .mesh import Mesh
+from hybridreg.data.simulate.ground import Terrain
+from hybridreg.data.simulate.mesh import Mesh
 
 # Material index of the ground at x, y.
 Surface = Callable[[np.ndarray, np.ndarray], np.ndarray]
@@ -25,9 +25,13 @@ class Layout:
     surface: Surface
     stand: Stand
     still: list[Mesh] = field(default_factory=list)
-    at_source: list[Mesh] = field(default_factory=list)  # movers when the source scans (and the picture is taken)
+    at_source: list[Mesh] = field(
+        default_factory=list
+    )  # movers when the source scans (and the picture is taken)
     at_target: list[Mesh] = field(default_factory=list)  # the same movers when the target scans
-    taken: np.ndarray = field(default_factory=lambda: np.zeros((0, 6)))  # x, y, half sizes, cosine and sine of yaw
+    taken: np.ndarray = field(
+        default_factory=lambda: np.zeros((0, 6))
+    )  # x, y, half sizes, cosine and sine of yaw
 
     def free(self, xy: np.ndarray, radius: float) -> bool:
         """Whether a disc about `xy` (2,) touches nothing."""
@@ -55,7 +59,13 @@ class Layout:
         return True
 
     def put_mover(
-        self, thing: Mesh, xy: np.ndarray, yaw: float, step: np.ndarray, half: tuple[float, float], when: str = "both"
+        self,
+        thing: Mesh,
+        xy: np.ndarray,
+        yaw: float,
+        step: np.ndarray,
+        half: tuple[float, float],
+        when: str = "both",
     ) -> bool:
         """Set down a mover: at `xy` for the source scan, at `xy + step` for the target scan.
 

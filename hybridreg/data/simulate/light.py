@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .texture import noise_at
+from hybridreg.data.simulate.texture import noise_at
 
 
 @dataclass(frozen=True)

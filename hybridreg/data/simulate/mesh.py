@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from .materials import MATERIAL_INDEX
+from hybridreg.data.simulate.materials import MATERIAL_INDEX
 
 Tint = tuple[float, float, float]
 
@@ -56,5 +56,8 @@ class Mesh:
 
 
 EMPTY = Mesh(
-    np.zeros((0, 3), np.float32), np.zeros((0, 3), np.int32), np.zeros(0, np.uint8), np.zeros((0, 3), np.float32)
+    np.zeros((0, 3), np.float32),
+    np.zeros((0, 3), np.int32),
+    np.zeros(0, np.uint8),
+    np.zeros((0, 3), np.float32),
 )

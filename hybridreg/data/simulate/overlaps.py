@@ -8,9 +8,9 @@ from functools import lru_cache
 import numpy as np
 from scipy.spatial import cKDTree
 
-from .caster import World
-from .patterns import pattern
-from .sensors import Sensor
+from hybridreg.data.simulate.caster import World
+from hybridreg.data.simulate.patterns import pattern
+from hybridreg.data.simulate.sensors import Sensor
 
 RADIUS = 0.5  # metres; the definition that the real pairs' figures use
 
@@ -24,7 +24,9 @@ def thin(points: np.ndarray, voxel: float) -> np.ndarray:
     return points[first]
 
 
-def overlap(source: np.ndarray, target: np.ndarray, T_target_source: np.ndarray, radius: float = RADIUS) -> float:
+def overlap(
+    source: np.ndarray, target: np.ndarray, T_target_source: np.ndarray, radius: float = RADIUS
+) -> float:
     """Share of `source` (N,3) with a point of `target` (M,3) within `radius` metres under the transform."""
     if len(source) == 0 or len(target) == 0:
         return 0.0
@@ -49,8 +51,12 @@ def expected_overlap(
     ray = points - T_world_target[:3, 3]
     distance = np.linalg.norm(ray, axis=1)
     ray /= distance[:, None]
-    reached = _near_a_beam(target, ray @ T_world_target[:3, :3], distance, np.abs(np.sum(normals * ray, axis=1)))
-    return float((reached & world.visible(T_world_target[:3, 3], ray.astype(np.float32), distance - 0.3)).mean())
+    reached = _near_a_beam(
+        target, ray @ T_world_target[:3, :3], distance, np.abs(np.sum(normals * ray, axis=1))
+    )
+    return float(
+        (reached & world.visible(T_world_target[:3, 3], ray.astype(np.float32), distance - 0.3)).mean()
+    )
 
 
 @lru_cache(maxsize=16)
@@ -65,7 +71,9 @@ def _near_a_beam(sensor: Sensor, ray: np.ndarray, distance: np.ndarray, cosine: 
         gap = np.abs(elevation[:, None] - np.array(sensor.elevations_deg)).min(axis=1)
     else:
         azimuth = np.degrees(np.arctan2(ray[:, 1], ray[:, 0]))
-        gap = np.maximum(np.abs(azimuth) - sensor.fov_deg[0] / 2, np.abs(elevation) - sensor.fov_deg[1] / 2).clip(0)
+        gap = np.maximum(
+            np.abs(azimuth) - sensor.fov_deg[0] / 2, np.abs(elevation) - sensor.fov_deg[1] / 2
+        ).clip(0)
     # Along a slanted surface the next ring is farther away than across the beam.
     near = np.radians(gap) * distance / np.clip(cosine, 0.05, 1) < RADIUS
     return near & (distance < sensor.range_10 * 1.2) & (distance > sensor.range_min)

@@ -7,12 +7,16 @@ from collections.abc import Callable
 
 import numpy as np
 
-from .sensors import Sensor
+from hybridreg.data.simulate.sensors import Sensor
 
 
 def _directions(azimuth: np.ndarray, elevation: np.ndarray) -> np.ndarray:
     c = np.cos(elevation)
-    return np.stack([c * np.cos(azimuth), c * np.sin(azimuth), np.sin(elevation)], -1).reshape(-1, 3).astype(np.float32)
+    return (
+        np.stack([c * np.cos(azimuth), c * np.sin(azimuth), np.sin(elevation)], -1)
+        .reshape(-1, 3)
+        .astype(np.float32)
+    )
 
 
 def spinning(sensor: Sensor, rng: np.random.Generator) -> np.ndarray:

@@ -5,9 +5,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from .furniture import muted
-from .mesh import Mesh
-from .solids import ellipsoid, tubes
+from hybridreg.data.simulate.furniture import muted
+from hybridreg.data.simulate.mesh import Mesh
+from hybridreg.data.simulate.solids import ellipsoid, tubes
 
 
 def person(rng: np.random.Generator) -> Mesh:
@@ -26,7 +26,12 @@ def person(rng: np.random.Generator) -> Mesh:
         0.055, 0.04, "cloth", coat,
     )  # fmt: skip
     torso = ellipsoid((0, 0, (hip + shoulder) / 2), (0.14, 0.22, 0.2 * h + 0.03), "cloth", coat)
-    head = ellipsoid((0.02, 0, 0.92 * h), (0.1, 0.085, 0.075 * h), "cloth", rng.choice([0.2, 0.6, 0.8]) * np.array([1, 0.8, 0.65]))
+    head = ellipsoid(
+        (0.02, 0, 0.92 * h),
+        (0.1, 0.085, 0.075 * h),
+        "cloth",
+        rng.choice([0.2, 0.6, 0.8]) * np.array([1, 0.8, 0.65]),
+    )
     return Mesh.merge([legs, arms, torso, head])
 
 
@@ -39,10 +44,12 @@ def bicycle(rng: np.random.Generator) -> Mesh:
         tubes(rim[:-1] + [x, 0, 0], rim[1:] + [x, 0, 0], 0.022, 0.022, "rubber", (0.08, 0.08, 0.08), sides=4)
         for x in (-0.52, 0.52)
     ]
-    knots = np.array([[-.52, 0, .34], [-.18, 0, .9], [.42, 0, .92], [-.08, 0, .3], [.52, 0, .34]])
+    knots = np.array([[-0.52, 0, 0.34], [-0.18, 0, 0.9], [0.42, 0, 0.92], [-0.08, 0, 0.3], [0.52, 0, 0.34]])
     ends = np.array([[1, 2], [1, 3], [0, 3], [3, 2], [2, 4], [0, 1]])
     frame = tubes(knots[ends[:, 0]], knots[ends[:, 1]], 0.02, 0.02, "metal", tint, sides=4)
-    bar = tubes(np.array([[0.4, -0.28, 1.05]]), np.array([[0.4, 0.28, 1.05]]), 0.02, 0.02, "metal", tint, sides=4)
+    bar = tubes(
+        np.array([[0.4, -0.28, 1.05]]), np.array([[0.4, 0.28, 1.05]]), 0.02, 0.02, "metal", tint, sides=4
+    )
     return Mesh.merge([*wheels, frame, bar])
 
 

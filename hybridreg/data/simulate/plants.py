@@ -7,9 +7,9 @@ from functools import partial
 
 import numpy as np
 
-from .mesh import Mesh
-from .pool import one_of
-from .solids import boxes, cards, tubes
+from hybridreg.data.simulate.mesh import Mesh
+from hybridreg.data.simulate.pool import one_of
+from hybridreg.data.simulate.solids import boxes, cards, tubes
 
 _GREENS = np.array([[.24, .36, .12], [.32, .42, .16], [.18, .30, .14], [.42, .44, .18], [.50, .38, .15]])  # fmt: skip
 KINDS = {"round": 0.52, "tall": 0.2, "conifer": 0.18, "bare": 0.1}
@@ -28,10 +28,23 @@ def tree(rng: np.random.Generator, kind: str, leaves: int) -> Mesh:
     knee = np.array([*(lean * 0.3 + rng.normal(0, 0.1, 2)), clear])
     bark = np.array([0.30, 0.25, 0.20]) * rng.uniform(0.6, 1.4)
     foot = np.array([[0, 0, -0.3], knee])
-    trunk = tubes(foot, np.array([knee, top]), np.array([1.25, 0.8]) * girth, np.array([0.8, 0.15]) * girth, "bark", bark)
+    trunk = tubes(
+        foot,
+        np.array([knee, top]),
+        np.array([1.25, 0.8]) * girth,
+        np.array([0.8, 0.15]) * girth,
+        "bark",
+        bark,
+    )
     tips = _tips(rng, kind, knee, top, height)
     branches = tubes(
-        knee + (top - knee) * rng.uniform(0, 0.55, (len(tips), 1)), tips, 0.3 * girth, 0.06 * girth, "bark", bark, 4
+        knee + (top - knee) * rng.uniform(0, 0.55, (len(tips), 1)),
+        tips,
+        0.3 * girth,
+        0.06 * girth,
+        "bark",
+        bark,
+        4,
     )
     if kind == "bare":
         return Mesh.merge([trunk, branches, _twigs(rng, tips, height, bark)])
@@ -50,11 +63,15 @@ def tree_from_pool(rng: np.random.Generator, distance: float, kind: str | None =
     return one_of(TREES[kind, leaves], rng, variants=40, stretch=0.16)
 
 
-def _tips(rng: np.random.Generator, kind: str, knee: np.ndarray, top: np.ndarray, height: float) -> np.ndarray:
+def _tips(
+    rng: np.random.Generator, kind: str, knee: np.ndarray, top: np.ndarray, height: float
+) -> np.ndarray:
     n = int(rng.integers(6, 12))
     angle = rng.uniform(0, 2 * np.pi, n)
     level = rng.uniform(0.15, 0.95, n)
-    spread = {"round": 0.30, "tall": 0.12, "conifer": 0.24, "bare": 0.28}[kind] * height * rng.uniform(0.7, 1.15)
+    spread = (
+        {"round": 0.30, "tall": 0.12, "conifer": 0.24, "bare": 0.28}[kind] * height * rng.uniform(0.7, 1.15)
+    )
     narrowing = (1 - level) if kind == "conifer" else np.sqrt(np.clip(1 - (2 * level - 0.9) ** 2, 0.1, 1))
     reach = spread * narrowing * rng.uniform(0.5, 1.0, n)
     offset = np.c_[reach * np.cos(angle), reach * np.sin(angle), np.zeros(n)]
@@ -67,7 +84,13 @@ def _twigs(rng: np.random.Generator, tips: np.ndarray, height: float, bark: np.n
 
 
 def _crown(
-    rng: np.random.Generator, kind: str, knee: np.ndarray, top: np.ndarray, tips: np.ndarray, height: float, leaves: int
+    rng: np.random.Generator,
+    kind: str,
+    knee: np.ndarray,
+    top: np.ndarray,
+    tips: np.ndarray,
+    height: float,
+    leaves: int,
 ) -> Mesh:
     tint = _GREENS[rng.integers(len(_GREENS))] * rng.uniform(0.7, 1.25)
     if kind == "conifer":
@@ -91,7 +114,13 @@ def bush(rng: np.random.Generator) -> Mesh:
     width, height = rng.uniform(0.4, 1.3), rng.uniform(0.3, 1.6)
     offset = rng.normal(0, 0.5, (leaves, 3)) * [width, width, 0.45 * height] + [0, 0, 0.45 * height]
     offset[:, 2] = np.abs(offset[:, 2])
-    return cards(offset, rng.uniform(0.06, 0.18, leaves), rng, "leaves", _GREENS[rng.integers(5)] * rng.uniform(0.7, 1.2))
+    return cards(
+        offset,
+        rng.uniform(0.06, 0.18, leaves),
+        rng,
+        "leaves",
+        _GREENS[rng.integers(5)] * rng.uniform(0.7, 1.2),
+    )
 
 
 def hedge(rng: np.random.Generator, length: float) -> Mesh:

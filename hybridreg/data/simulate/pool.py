@@ -9,7 +9,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from .mesh import Mesh
+from hybridreg.data.simulate.mesh import Mesh
 
 Maker = Callable[[np.random.Generator], Mesh]
 

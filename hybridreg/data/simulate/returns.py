@@ -5,9 +5,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from .caster import Hits
-from .materials import LOST, MATERIAL_INDEX, REFLECTIVITY, ROUGHNESS
-from .sensors import Sensor
+from hybridreg.data.simulate.caster import Hits
+from hybridreg.data.simulate.materials import LOST, MATERIAL_INDEX, REFLECTIVITY, ROUGHNESS
+from hybridreg.data.simulate.sensors import Sensor
 
 STRAY_SHARE = 0.0004
 INSIDE_SHARE = 0.35  # of the pulses that pass a pane: they come back from the room or the seats behind it
@@ -15,7 +15,9 @@ MIXED_SHARE = 0.3  # of pulses at an edge
 GLASS = MATERIAL_INDEX["glass"]
 
 
-def measured_ranges(sensor: Sensor, directions: np.ndarray, hits: Hits, rng: np.random.Generator) -> np.ndarray:
+def measured_ranges(
+    sensor: Sensor, directions: np.ndarray, hits: Hits, rng: np.random.Generator
+) -> np.ndarray:
     """Reported range (n,) of each pulse, NaN where nothing is reported.
 
     Every random number is drawn for every pulse, so that one changed hit changes one range only.

@@ -8,12 +8,12 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from .caster import Hits, World
-from .layout import Surface
-from .materials import COLOUR, GROUND
-from .patterns import pattern
-from .returns import measured_ranges
-from .sensors import Sensor
+from hybridreg.data.simulate.caster import Hits, World
+from hybridreg.data.simulate.layout import Surface
+from hybridreg.data.simulate.materials import COLOUR, GROUND
+from hybridreg.data.simulate.patterns import pattern
+from hybridreg.data.simulate.returns import measured_ranges
+from hybridreg.data.simulate.sensors import Sensor
 
 
 def with_ground(hits: Hits, origin: np.ndarray, directions: np.ndarray, surface: Surface) -> Hits:

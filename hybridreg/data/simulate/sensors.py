@@ -15,7 +15,10 @@ class Sensor:
     name: str
     kind: str  # "spinning", "fan", "rosette" or "raster": one of patterns.PATTERNS
     points: int  # pulses per scan
-    fov_deg: tuple[float, float] = (360.0, 0.0)  # across and up; up follows from `elevations_deg` when spinning
+    fov_deg: tuple[float, float] = (
+        360.0,
+        0.0,
+    )  # across and up; up follows from `elevations_deg` when spinning
     elevations_deg: tuple[float, ...] = ()  # one per beam, spinning sensors only
     range_min: float = 0.5  # blind zone, metres
     range_max: float = 120.0
@@ -46,12 +49,14 @@ SENSORS = {
         Sensor(name="hdl32e", kind="spinning", elevations_deg=_steps((-30.67, 10.67, 32)), points=32 * 2160,
                range_10=45, range_max=90),
         Sensor(name="vlp32c", kind="spinning", elevations_deg=_VLP32C, points=32 * 1800, range_10=80, range_max=200),
-        Sensor(name="pandar40", kind="spinning", elevations_deg=_PANDAR40, points=40 * 1800, range_10=80, range_max=200),
+        Sensor(name="pandar40", kind="spinning", elevations_deg=_PANDAR40, points=40 * 1800, range_10=80,
+               range_max=200),
         Sensor(name="hdl64e", kind="spinning", elevations_deg=_HDL64E, points=64 * 2083, range_min=0.9, range_10=50,
                range_max=90, noise_m=0.015),
         Sensor(name="os1-64", kind="spinning", elevations_deg=_steps((-16.6, 16.6, 64)), points=64 * 2048,
                range_min=0.8, range_10=26, noise_m=0.018, noise_growth=0.0006, divergence_mrad=3.2),
-        Sensor(name="pandar64", kind="spinning", elevations_deg=_PANDAR64, points=64 * 1800, range_10=80, range_max=200),
+        Sensor(name="pandar64", kind="spinning", elevations_deg=_PANDAR64, points=64 * 1800, range_10=80,
+               range_max=200),
         Sensor(name="pandarqt", kind="spinning", elevations_deg=_steps((-52.1, 52.1, 64)), points=64 * 600,
                range_min=0.1, range_10=18, range_max=60),
         Sensor(name="vls128", kind="spinning", elevations_deg=_VLS128, points=128 * 1800, range_10=110, range_max=220),

@@ -7,12 +7,25 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from .mesh import Mesh
+from hybridreg.data.simulate.mesh import Mesh
 
-_BOX = np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0], [-1, -1, 1], [1, -1, 1], [1, 1, 1], [-1, 1, 1]])
+_BOX = np.array(
+    [[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0], [-1, -1, 1], [1, -1, 1], [1, 1, 1], [-1, 1, 1]]
+)
 # No bottom: nothing simulated is ever seen from below at the height where it stands on the ground.
 _BOX_FACES = np.array(
-    [[4, 5, 6], [4, 6, 7], [0, 1, 5], [0, 5, 4], [1, 2, 6], [1, 6, 5], [2, 3, 7], [2, 7, 6], [3, 0, 4], [3, 4, 7]]
+    [
+        [4, 5, 6],
+        [4, 6, 7],
+        [0, 1, 5],
+        [0, 5, 4],
+        [1, 2, 6],
+        [1, 6, 5],
+        [2, 3, 7],
+        [2, 7, 6],
+        [3, 0, 4],
+        [3, 4, 7],
+    ]
 )
 
 
@@ -86,7 +99,8 @@ def ellipsoid(centre: Sequence[float], radii: Sequence[float], material: str, ti
     polar = np.linspace(0.15, np.pi - 0.15, 5)[:, None]
     turn = np.linspace(0, 2 * np.pi, 8, endpoint=False)[None]
     unit = np.stack(
-        [np.sin(polar) * np.cos(turn), np.sin(polar) * np.sin(turn), np.broadcast_to(np.cos(polar), (5, 8))], -1
+        [np.sin(polar) * np.cos(turn), np.sin(polar) * np.sin(turn), np.broadcast_to(np.cos(polar), (5, 8))],
+        -1,
     )
     return loft(unit * np.asarray(radii) + np.asarray(centre), material, tint)
 

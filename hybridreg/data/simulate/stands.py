@@ -7,12 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .carriers import Carrier, draw_carrier, mount
-from .caster import World
-from .layout import Layout
-from .overlaps import expected_overlap
-from .sensors import Sensor
-from .tiers import Tier
+from hybridreg.data.simulate.carriers import Carrier, draw_carrier, mount
+from hybridreg.data.simulate.caster import World
+from hybridreg.data.simulate.layout import Layout
+from hybridreg.data.simulate.overlaps import expected_overlap
+from hybridreg.data.simulate.sensors import Sensor
+from hybridreg.data.simulate.tiers import Tier
 
 PROPOSALS = 12
 CLOSE_ENOUGH = 0.1  # between the wanted and the expected overlap
@@ -41,7 +41,9 @@ def free_place(layout: Layout, room: float, rng: np.random.Generator) -> np.ndar
     return xy
 
 
-def _propose(layout: Layout, tier: Tier, carriers: tuple[Carrier, Carrier], rng: np.random.Generator) -> tuple[Stand, Stand]:
+def _propose(
+    layout: Layout, tier: Tier, carriers: tuple[Carrier, Carrier], rng: np.random.Generator
+) -> tuple[Stand, Stand]:
     """Two stands at the tier's distance; the source often looks towards the target, never by rule."""
     best: tuple[float, np.ndarray, np.ndarray] = (np.inf, np.zeros(2), np.zeros(2))
     for _ in range(60):
@@ -60,7 +62,9 @@ def _propose(layout: Layout, tier: Tier, carriers: tuple[Carrier, Carrier], rng:
         between = target - source
     towards = float(np.arctan2(between[1], between[0]))
     yaw = towards + rng.normal(0, 0.7) if rng.random() < 0.5 else rng.uniform(0, 2 * np.pi)
-    return _stand(layout, source, carriers[0], yaw, rng), _stand(layout, target, carriers[1], rng.uniform(0, 6.283), rng)
+    return _stand(layout, source, carriers[0], yaw, rng), _stand(
+        layout, target, carriers[1], rng.uniform(0, 6.283), rng
+    )
 
 
 def choose_stands(

@@ -8,7 +8,7 @@ from functools import lru_cache
 import numpy as np
 from scipy.ndimage import zoom
 
-from .materials import CONTRAST, MATERIALS
+from hybridreg.data.simulate.materials import CONTRAST, MATERIALS
 
 _SIZE = 256
 _NAMES = tuple(dict.fromkeys(m.texture for m in MATERIALS))
@@ -33,11 +33,15 @@ def noise_at(u: np.ndarray, v: np.ndarray, metres: float) -> np.ndarray:
     return _noise()[row, column]
 
 
-def _grid_lines(u: np.ndarray, v: np.ndarray, wide: float, high: float, joint: float, stagger: bool) -> np.ndarray:
+def _grid_lines(
+    u: np.ndarray, v: np.ndarray, wide: float, high: float, joint: float, stagger: bool
+) -> np.ndarray:
     row = np.floor(v / high)
     shifted = u + (0.5 * wide * (row % 2) if stagger else 0.0)
     on_joint = ((shifted % wide) < joint) | ((v % high) < joint)
-    stone = _noise()[(np.floor(shifted / wide).astype(np.int64) * 7) % _SIZE, (row.astype(np.int64) * 13) % _SIZE]
+    stone = _noise()[
+        (np.floor(shifted / wide).astype(np.int64) * 7) % _SIZE, (row.astype(np.int64) * 13) % _SIZE
+    ]
     return np.where(on_joint, -1.6, 0.7 * stone)
 
 

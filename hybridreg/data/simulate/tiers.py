@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from .scenes import DEGENERATE, USUAL
+from hybridreg.data.simulate.scenes import DEGENERATE, USUAL
 
 
 @dataclass(frozen=True)

@@ -43,7 +43,9 @@ def test_no_two_exposures_are_alike_and_the_weather_shows() -> None:
     world = world_with(layout, stand)
     camera = Camera.near(stand.T_world_sensor, rng)
     shots = [
-        photograph(world, layout.surface, camera, Light.draw(np.random.default_rng(k)), np.random.default_rng(9))
+        photograph(
+            world, layout.surface, camera, Light.draw(np.random.default_rng(k)), np.random.default_rng(9)
+        )
         for k in range(4)
     ]
     differences = [np.abs(shots[0].astype(int) - shot.astype(int)).mean() for shot in shots[1:]]

@@ -52,13 +52,17 @@ def test_nearer_part_hides_the_farther_one(rays: np.ndarray) -> None:
 
 def test_a_world_may_have_no_movers(rays: np.ndarray) -> None:
     alone, with_empty = World([Part(cube(5.0))]), World([Part(cube(5.0)), Part(EMPTY)])
-    np.testing.assert_array_equal(alone.cast(np.zeros(3), rays).distance, with_empty.cast(np.zeros(3), rays).distance)
+    np.testing.assert_array_equal(
+        alone.cast(np.zeros(3), rays).distance, with_empty.cast(np.zeros(3), rays).distance
+    )
 
 
 def test_open3d_and_embreex_agree(rays: np.ndarray) -> None:
     rng = np.random.default_rng(1)
     start = rng.uniform(-10, 10, (40, 3))
-    mesh = Mesh.merge([cube(5.0), tubes(start, start + rng.normal(size=(40, 3)) * 3, 0.3, 0.1, "bark", (0, 0, 0))])
+    mesh = Mesh.merge(
+        [cube(5.0), tubes(start, start + rng.normal(size=(40, 3)) * 3, 0.3, 0.1, "bark", (0, 0, 0))]
+    )
     origins = np.zeros_like(rays)
     (t_one, face_one), (t_other, face_other) = (
         make(mesh).cast(origins, rays) for make in (EmbreexCaster, Open3dCaster)
@@ -69,7 +73,9 @@ def test_open3d_and_embreex_agree(rays: np.ndarray) -> None:
     assert np.isinf(t_one[face_one == -1]).all()
 
 
-def test_without_embreex_open3d_serves_and_without_both_the_cure_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_embreex_open3d_serves_and_without_both_the_cure_is_named(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     def missing(_: Mesh) -> None:
         raise ImportError("no such wheel")
 

@@ -29,10 +29,17 @@ def test_folders_read_back_identically(tmp_path: Path, mid_pair: Drawn, voxel: f
 
 def test_layout_on_disk_is_the_documented_one(tmp_path: Path, mid_pair: Drawn) -> None:
     write_pair(tmp_path / "one", mid_pair, FACTS, None)
-    assert sorted(p.name for p in (tmp_path / "one").iterdir()) == ["image.jpg", "meta.json", "source.npz", "target.npz"]
+    assert sorted(p.name for p in (tmp_path / "one").iterdir()) == [
+        "image.jpg",
+        "meta.json",
+        "source.npz",
+        "target.npz",
+    ]
     assert np.load(tmp_path / "one" / "source.npz")["xyz"].dtype == np.float32
     meta = json.loads((tmp_path / "one" / "meta.json").read_text())
-    assert {"T_target_source", "source_sensor", "target_sensor", "overlap", "tier", "seed", "version"} <= set(meta)
+    assert {"T_target_source", "source_sensor", "target_sensor", "overlap", "tier", "seed", "version"} <= set(
+        meta
+    )
 
 
 def test_a_pair_is_written_whole_or_not_at_all(
@@ -70,5 +77,7 @@ def test_the_pair_that_ships_is_sound(thin_sensors: tuple[Sensor, Sensor]) -> No
     demo = Path(hybridreg.data.__file__).parent / "demo"
     labelled = read_pair(demo)
     assert sum(f.stat().st_size for f in demo.iterdir()) < 300_000
-    share = simulate.overlap(labelled.pair.source.points, labelled.pair.target.points, labelled.T_target_source)
+    share = simulate.overlap(
+        labelled.pair.source.points, labelled.pair.target.points, labelled.T_target_source
+    )
     assert share == pytest.approx(labelled.overlap, abs=0.03)

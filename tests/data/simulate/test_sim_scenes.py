@@ -23,7 +23,7 @@ def test_meshes_are_sound(layout: Layout) -> None:
     assert mesh.faces.max() < len(mesh.vertices)
     assert mesh.material.max() < len(MATERIALS)
     assert len(mesh.faces) == len(mesh.material) == len(mesh.tint)
-    assert 0 <= mesh.tint.min()
+    assert mesh.tint.min() >= 0
     assert len(mesh.faces) < 90_000  # the ray caster's build time is what bounds pairs a second
 
 
@@ -31,7 +31,14 @@ def test_ground_has_a_material_everywhere_and_is_not_flat(layout: Layout) -> Non
     x, y = np.meshgrid(np.linspace(-100, 100, 41), np.linspace(-100, 100, 41))
     material = layout.surface(x, y)
     assert material.shape == x.shape
-    assert {MATERIALS[i].name for i in np.unique(material)} <= {"asphalt", "paving", "grass", "soil", "gravel"}
+    assert {MATERIALS[i].name for i in np.unique(material)} <= {
+        "asphalt",
+        "paving",
+        "grass",
+        "meadow",
+        "soil",
+        "gravel",
+    }
     assert layout.terrain.height(x, y).std() > 0.02
 
 
@@ -60,7 +67,9 @@ def test_things_move_between_the_scans() -> None:
     before, after = Mesh.merge(layout.at_source), Mesh.merge(layout.at_target)
     assert len(before.faces) > 0
     assert len(after.faces) > 0
-    assert not (before.vertices.shape == after.vertices.shape and np.allclose(before.vertices, after.vertices))
+    assert not (
+        before.vertices.shape == after.vertices.shape and np.allclose(before.vertices, after.vertices)
+    )
 
 
 def test_nothing_is_put_where_something_stands() -> None:

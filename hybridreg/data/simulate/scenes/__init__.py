@@ -7,13 +7,13 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ..layout import Layout
-from .campus import campus
-from .degenerate import corridor, open_field
-from .park import park, woods
-from .parking import parking
-from .street import street
-from .yard import yard
+from hybridreg.data.simulate.layout import Layout
+from hybridreg.data.simulate.scenes.campus import campus
+from hybridreg.data.simulate.scenes.degenerate import corridor, open_field
+from hybridreg.data.simulate.scenes.park import park, woods
+from hybridreg.data.simulate.scenes.parking import parking
+from hybridreg.data.simulate.scenes.street import street
+from hybridreg.data.simulate.scenes.yard import yard
 
 SCENES: dict[str, Callable[[np.random.Generator], Layout]] = {
     "street": street,

@@ -5,8 +5,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..layout import Layout
-from ..solids import boxes, cards
+from hybridreg.data.simulate.layout import Layout
+from hybridreg.data.simulate.solids import boxes, cards
 
 
 def add_backdrop(layout: Layout, rng: np.random.Generator) -> None:
@@ -24,4 +24,6 @@ def add_backdrop(layout: Layout, rng: np.random.Generator) -> None:
     tuft = rng.normal(0, 1, (len(trees), 45, 3)) * [2.2, 2.2, 2.6] + [0, 0, 7.5]
     centres = (trees[:, None] + tuft).reshape(-1, 3)
     if len(centres):
-        layout.still.append(cards(centres, rng.uniform(0.8, 1.7, len(centres)), rng, "leaves", (0.24, 0.32, 0.15)))
+        layout.still.append(
+            cards(centres, rng.uniform(0.8, 1.7, len(centres)), rng, "leaves", (0.24, 0.32, 0.15))
+        )

@@ -5,15 +5,22 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..buildings import building
-from ..furniture import fence, lamp, wall
-from ..ground import Terrain
-from ..layout import Layout, Surface
-from ..materials import MATERIAL_INDEX
-from ..plants import hedge
-from ..pool import one_of
-from .backdrop import add_backdrop
-from .scatter import add_car, add_furniture, add_people, in_box, plant_bushes, plant_trees
+from hybridreg.data.simulate.buildings import building
+from hybridreg.data.simulate.furniture import fence, lamp, wall
+from hybridreg.data.simulate.ground import Terrain
+from hybridreg.data.simulate.layout import Layout, Surface
+from hybridreg.data.simulate.materials import MATERIAL_INDEX
+from hybridreg.data.simulate.plants import hedge
+from hybridreg.data.simulate.pool import one_of
+from hybridreg.data.simulate.scenes.backdrop import add_backdrop
+from hybridreg.data.simulate.scenes.scatter import (
+    add_car,
+    add_furniture,
+    add_people,
+    in_box,
+    plant_bushes,
+    plant_trees,
+)
 
 
 def _paths(rng: np.random.Generator) -> Surface:
@@ -43,7 +50,9 @@ def campus(rng: np.random.Generator) -> Layout:
     plant_trees(layout, in_box(rng, (-75, -75), (75, 75), int(rng.integers(10, 42))), rng)
     plant_bushes(layout, in_box(rng, (-50, -50), (50, 50), int(rng.integers(5, 30))), rng)
     _borders(layout, rng)
-    add_furniture(layout, in_box(rng, (-40, -40), (40, 40), int(rng.integers(8, 26))), rng.uniform(0, 6.28), rng)
+    add_furniture(
+        layout, in_box(rng, (-40, -40), (40, 40), int(rng.integers(8, 26))), rng.uniform(0, 6.28), rng
+    )
     for xy in in_box(rng, (-45, -45), (45, 45), int(rng.integers(3, 12))):
         layout.put(one_of(lamp, rng), xy, rng.uniform(0, 6.28), (0.2, 0.2))
     for xy in in_box(rng, (-45, -45), (45, 45), int(rng.integers(0, 9))):
@@ -56,7 +65,9 @@ def campus(rng: np.random.Generator) -> Layout:
 def _place_building(layout: Layout, rng: np.random.Generator, square: bool) -> None:
     angle = rng.uniform(0, 2 * np.pi)
     size = np.array([rng.uniform(12, 42), rng.uniform(10, 20), rng.uniform(4, 22)])
-    xy = rng.uniform(17, 72) * np.array([np.cos(angle), np.sin(angle)]) + 0.4 * size[1] * np.array([np.cos(angle), np.sin(angle)])
+    xy = rng.uniform(17, 72) * np.array([np.cos(angle), np.sin(angle)]) + 0.4 * size[1] * np.array(
+        [np.cos(angle), np.sin(angle)]
+    )
     yaw = float(rng.choice([0, np.pi / 2])) if square else rng.uniform(0, np.pi)
     if not layout.free(xy, float(size[0]) / 2) or np.linalg.norm(xy) < size[0] / 2 + 5:
         return

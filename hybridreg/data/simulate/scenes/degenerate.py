@@ -5,11 +5,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..furniture import wall
-from ..ground import Terrain
-from ..layout import Layout
-from ..materials import MATERIAL_INDEX
-from .scatter import add_people, in_box, plant_bushes, plant_trees
+from hybridreg.data.simulate.furniture import wall
+from hybridreg.data.simulate.ground import Terrain
+from hybridreg.data.simulate.layout import Layout
+from hybridreg.data.simulate.materials import MATERIAL_INDEX
+from hybridreg.data.simulate.scenes.scatter import add_people, in_box, plant_bushes, plant_trees
 
 
 def corridor(rng: np.random.Generator) -> Layout:

@@ -5,15 +5,21 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..buildings import building
-from ..furniture import fence, heap, lamp
-from ..ground import Terrain
-from ..layout import Layout
-from ..materials import MATERIAL_INDEX
-from ..plants import hedge
-from ..pool import one_of
-from .backdrop import add_backdrop
-from .scatter import add_furniture, add_people, in_box, plant_bushes, plant_trees
+from hybridreg.data.simulate.buildings import building
+from hybridreg.data.simulate.furniture import fence, heap, lamp
+from hybridreg.data.simulate.ground import Terrain
+from hybridreg.data.simulate.layout import Layout
+from hybridreg.data.simulate.materials import MATERIAL_INDEX
+from hybridreg.data.simulate.plants import hedge
+from hybridreg.data.simulate.pool import one_of
+from hybridreg.data.simulate.scenes.backdrop import add_backdrop
+from hybridreg.data.simulate.scenes.scatter import (
+    add_furniture,
+    add_people,
+    in_box,
+    plant_bushes,
+    plant_trees,
+)
 
 
 def _with_path(rng: np.random.Generator, ground: str, relief: float, bumps: float) -> Layout:
@@ -51,7 +57,9 @@ def park(rng: np.random.Generator) -> Layout:
             layout.still.append(layout.on_ground(hedge(rng, length), xy, yaw))
     for xy in in_box(rng, (-40, -12), (40, 12), int(rng.integers(2, 8))):
         layout.put(one_of(lamp, rng), xy, rng.uniform(0, 6.28), (0.2, 0.2))
-    add_furniture(layout, in_box(rng, (-35, -15), (35, 15), int(rng.integers(4, 15))), rng.uniform(0, 6.28), rng)
+    add_furniture(
+        layout, in_box(rng, (-35, -15), (35, 15), int(rng.integers(4, 15))), rng.uniform(0, 6.28), rng
+    )
     add_people(layout, in_box(rng, (-30, -20), (30, 20), int(rng.integers(3, 15))), rng)
     add_backdrop(layout, rng)
     return layout

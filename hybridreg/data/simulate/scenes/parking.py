@@ -5,14 +5,21 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..buildings import building
-from ..furniture import lamp
-from ..ground import Terrain
-from ..layout import Layout
-from ..materials import MATERIAL_INDEX
-from ..pool import one_of
-from .backdrop import add_backdrop
-from .scatter import add_car, add_furniture, add_people, in_box, plant_bushes, plant_trees
+from hybridreg.data.simulate.buildings import building
+from hybridreg.data.simulate.furniture import lamp
+from hybridreg.data.simulate.ground import Terrain
+from hybridreg.data.simulate.layout import Layout
+from hybridreg.data.simulate.materials import MATERIAL_INDEX
+from hybridreg.data.simulate.pool import one_of
+from hybridreg.data.simulate.scenes.backdrop import add_backdrop
+from hybridreg.data.simulate.scenes.scatter import (
+    add_car,
+    add_furniture,
+    add_people,
+    in_box,
+    plant_bushes,
+    plant_trees,
+)
 
 
 def parking(rng: np.random.Generator) -> Layout:

@@ -7,17 +7,24 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..buildings import building
-from ..furniture import bollards, fence, lamp, sign, traffic_light
-from ..ground import Terrain
-from ..layout import Layout, Surface
-from ..materials import MATERIAL_INDEX
-from ..mesh import Mesh
-from ..plants import hedge
-from ..solids import boxes
-from ..pool import one_of
-from .backdrop import add_backdrop
-from .scatter import add_car, add_furniture, add_people, in_box, plant_bushes, plant_trees
+from hybridreg.data.simulate.buildings import building
+from hybridreg.data.simulate.furniture import bollards, fence, lamp, sign, traffic_light
+from hybridreg.data.simulate.ground import Terrain
+from hybridreg.data.simulate.layout import Layout, Surface
+from hybridreg.data.simulate.materials import MATERIAL_INDEX
+from hybridreg.data.simulate.mesh import Mesh
+from hybridreg.data.simulate.plants import hedge
+from hybridreg.data.simulate.pool import one_of
+from hybridreg.data.simulate.scenes.backdrop import add_backdrop
+from hybridreg.data.simulate.scenes.scatter import (
+    add_car,
+    add_furniture,
+    add_people,
+    in_box,
+    plant_bushes,
+    plant_trees,
+)
+from hybridreg.data.simulate.solids import boxes
 
 
 @dataclass(frozen=True)
@@ -62,7 +69,9 @@ def _surface(course: Course, verge: str) -> Surface:
         off = np.abs(y - course.bend(x))
         if course.crossing is not None:
             off = np.minimum(off, np.abs(x - course.crossing))
-        return np.where(off < course.road, asphalt, np.where(off < course.road + course.pavement, paving, other))
+        return np.where(
+            off < course.road, asphalt, np.where(off < course.road + course.pavement, paving, other)
+        )
 
     return surface
 
@@ -105,7 +114,9 @@ def _houses(layout: Layout, course: Course, side: float, rng: np.random.Generato
     mean_height = rng.uniform(5, 18)
     gappy = rng.random() < 0.5
     while x < 120:
-        size = np.array([rng.uniform(9, 28), rng.uniform(8, 14), np.clip(rng.normal(mean_height, 2.5), 3.5, 28)])
+        size = np.array(
+            [rng.uniform(9, 28), rng.uniform(8, 14), np.clip(rng.normal(mean_height, 2.5), 3.5, 28)]
+        )
         mid = x + size[0] / 2
         back = course.road + course.pavement + course.lawn + size[1] / 2 + max(rng.normal(0.4, 1.0), 0.1)
         xy = course.at(mid, side * back)
@@ -133,11 +144,26 @@ def _roadside(layout: Layout, course: Course, side: float, rng: np.random.Genera
         spacing = rng.uniform(5.5, 14)
         x = np.arange(-80, 80, spacing) + rng.normal(0, 0.8, len(np.arange(-80, 80, spacing)))
         line = edge + (0.4 if course.lawn == 0 else course.pavement + 0.5 * course.lawn)
-        plant_trees(layout, np.stack([course.at(v, side * line) for v in x]), rng, "round" if rng.random() < 0.5 else None)
+        plant_trees(
+            layout,
+            np.stack([course.at(v, side * line) for v in x]),
+            rng,
+            "round" if rng.random() < 0.5 else None,
+        )
     spots = rng.uniform(-60, 60, int(rng.integers(6, 20)))
-    add_furniture(layout, np.stack([course.at(v, side * (edge + rng.uniform(0.2, course.pavement))) for v in spots]), 0.0, rng)
+    add_furniture(
+        layout,
+        np.stack([course.at(v, side * (edge + rng.uniform(0.2, course.pavement))) for v in spots]),
+        0.0,
+        rng,
+    )
     for _ in range(int(rng.integers(1, 5))):
-        layout.put(one_of(sign, rng), course.at(rng.uniform(-50, 50), side * edge), rng.choice([0, np.pi]), (0.2, 0.2))
+        layout.put(
+            one_of(sign, rng),
+            course.at(rng.uniform(-50, 50), side * edge),
+            rng.choice([0, np.pi]),
+            (0.2, 0.2),
+        )
     if course.lawn > 1.5:
         _front_gardens(layout, course, side, rng)
 
@@ -146,7 +172,12 @@ def _front_gardens(layout: Layout, course: Course, side: float, rng: np.random.G
     reach = course.road + course.pavement
 
     def places(n: int) -> np.ndarray:
-        return np.stack([course.at(rng.uniform(-75, 75), side * (reach + rng.uniform(0.3, course.lawn))) for _ in range(n)])
+        return np.stack(
+            [
+                course.at(rng.uniform(-75, 75), side * (reach + rng.uniform(0.3, course.lawn)))
+                for _ in range(n)
+            ]
+        )
 
     border = rng.choice(3)
     for x in np.arange(-70, 70, rng.uniform(8, 20)):
@@ -154,7 +185,10 @@ def _front_gardens(layout: Layout, course: Course, side: float, rng: np.random.G
         if border == 0 and rng.random() < 0.7:
             layout.put(hedge(rng, length), xy, course.yaw(x), (length / 2, 0.5))
         elif border == 1 and rng.random() < 0.7:
-            ends = course.at(x - length / 2, side * (reach + 0.4)), course.at(x + length / 2, side * (reach + 0.4))
+            ends = (
+                course.at(x - length / 2, side * (reach + 0.4)),
+                course.at(x + length / 2, side * (reach + 0.4)),
+            )
             layout.still.append(fence(rng, layout.line(*ends, 2.2)))
     plant_trees(layout, places(int(rng.integers(2, 14))), rng)
     plant_bushes(layout, places(int(rng.integers(8, 32))), rng)
@@ -178,5 +212,9 @@ def _traffic(layout: Layout, course: Course, rng: np.random.Generator) -> None:
                 layout.put(one_of(traffic_light, rng), xy, rng.uniform(0, 6.28), (0.2, 0.2))
     elif rng.random() < 0.3:
         x0 = rng.uniform(-20, 20)
-        layout.still.append(bollards(layout.line(course.at(x0, course.road + 0.3), course.at(x0 + 12, course.road + 0.3), 1.5)))
+        layout.still.append(
+            bollards(
+                layout.line(course.at(x0, course.road + 0.3), course.at(x0 + 12, course.road + 0.3), 1.5)
+            )
+        )
     plant_bushes(layout, in_box(rng, (-70, -30), (70, 30), 8), rng)

@@ -5,21 +5,23 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..buildings import building
-from ..cars import lorry
-from ..furniture import bollards, container, fence, heap, lamp, pipes, scaffold, wall
-from ..ground import Terrain
-from ..layout import Layout
-from ..materials import MATERIAL_INDEX
-from ..pool import one_of
-from .backdrop import add_backdrop
-from .scatter import add_car, add_people, in_box, plant_bushes, plant_trees
+from hybridreg.data.simulate.buildings import building
+from hybridreg.data.simulate.cars import lorry
+from hybridreg.data.simulate.furniture import bollards, container, fence, heap, lamp, pipes, scaffold, wall
+from hybridreg.data.simulate.ground import Terrain
+from hybridreg.data.simulate.layout import Layout
+from hybridreg.data.simulate.materials import MATERIAL_INDEX
+from hybridreg.data.simulate.pool import one_of
+from hybridreg.data.simulate.scenes.backdrop import add_backdrop
+from hybridreg.data.simulate.scenes.scatter import add_car, add_people, in_box, plant_bushes, plant_trees
 
 
 def yard(rng: np.random.Generator) -> Layout:
     """Stacks and machines at odd angles inside a fence."""
     terrain = Terrain.draw(rng, rng.uniform(0.15, 0.8))
-    hard, soft = (MATERIAL_INDEX[m] for m in rng.choice([["asphalt", "gravel"], ["gravel", "soil"], ["soil", "soil"]]))
+    hard, soft = (
+        MATERIAL_INDEX[m] for m in rng.choice([["asphalt", "gravel"], ["gravel", "soil"], ["soil", "soil"]])
+    )
     seam = rng.normal(0, 1, 2)
 
     def surface(x: np.ndarray, y: np.ndarray) -> np.ndarray:

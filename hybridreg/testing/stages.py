@@ -1,9 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A conformance suite for stages: the library's own pass it, and so should yours.
-
->>> from hybridreg.testing import check_stage
->>> check_stage(MyMatcher(), "match")
-"""
+"""What every stage owes its pipeline, as checks."""
 
 from __future__ import annotations
 
@@ -18,9 +14,9 @@ from numpy.typing import NDArray
 
 from hybridreg import se3
 from hybridreg.matches import Correspondences, Overlap, Pose
-from hybridreg.pair import Pair
 from hybridreg.scene import Level, Scene
 from hybridreg.slots import SLOTS
+from hybridreg.testing.samples import sample_scene, true_matches
 
 Array = NDArray[np.float64]
 Check = Callable[[Any, str], None]
@@ -71,41 +67,10 @@ def slot_of(stage: Any) -> str:
 
     registered = name_of(stage)
     if registered is None:
-        raise ValueError(f"{type(stage).__name__} is not registered; say which slot it fills: {', '.join(SLOTS)}")
+        raise ValueError(
+            f"{type(stage).__name__} is not registered; say which slot it fills: {', '.join(SLOTS)}"
+        )
     return registered.partition(".")[0]
-
-
-def sample_pair(seed: int = 0, n_points: int = 3000) -> tuple[Pair, Array]:
-    """A small made scene that two sensors saw in part: the pair, and its true pose (4, 4)."""
-    rng = np.random.default_rng(seed)
-    world = _courtyard(rng, n_points)
-    T = se3.from_rt(se3.rotation_about(np.array([0.02, -0.01, 0.4])), np.array([1.5, -1.0, 0.1]))
-    seen_by_source = world[world[:, 0] > -6.0]
-    seen_by_target = se3.apply(T, world[world[:, 0] < 9.0])
-    noise = [rng.normal(0.0, 0.01, cloud.shape) for cloud in (seen_by_source, seen_by_target)]
-    image = rng.integers(0, 255, (72, 128, 3), dtype=np.uint8)
-    return Pair.of(seen_by_source + noise[0], seen_by_target + noise[1], image, id=f"courtyard-{seed}"), T
-
-
-def sample_scene(seed: int = 0) -> tuple[Scene, Array]:
-    """`sample_pair` on a grid of 0.4 m."""
-    from hybridreg.classical.voxel import VoxelGrid
-
-    pair, T = sample_pair(seed)
-    return VoxelGrid(voxel=0.4)(pair), T
-
-
-def _courtyard(rng: np.random.Generator, n: int) -> Array:
-    ground = np.column_stack([rng.uniform(-12, 12, (n, 2)), np.full(n, -1.6)])
-    boxes = [ground]
-    for _ in range(14):
-        centre, size = rng.uniform(-10, 10, 2), rng.uniform(0.6, 4.0, 3)
-        face = rng.integers(0, 4, n // 3)
-        u, v = rng.uniform(-0.5, 0.5, (2, n // 3))
-        side = np.where(face % 2 == 0, 0.5, -0.5)
-        x, y = np.where(face < 2, side, u), np.where(face < 2, u, side)
-        boxes.append(np.column_stack([centre[0] + size[0] * x, centre[1] + size[1] * y, size[2] * (v + 0.5) - 1.6]))
-    return np.vstack(boxes)
 
 
 def check_parameters(stage: Any, slot: str) -> None:
@@ -125,7 +90,9 @@ def check_pickle_and_clone(stage: Any, slot: str) -> None:
     if hasattr(stage, "get_params"):
         params = stage.get_params(deep=False)
         clone = type(stage)(**params)
-        assert all(clone.get_params(deep=False)[k] is v for k, v in params.items()), "parameters are not kept as given"
+        assert all(clone.get_params(deep=False)[k] is v for k, v in params.items()), (
+            "parameters are not kept as given"
+        )
 
 
 def check_output(stage: Any, slot: str) -> None:
@@ -147,7 +114,7 @@ def check_seed(stage: Any, slot: str) -> None:
 
 def check_permuted_points(stage: Any, slot: str) -> None:
     """The order of the points does not matter beyond the draw of random samples."""
-    scene, truth = sample_scene()
+    scene, _ = sample_scene()
     order = np.random.default_rng(1).permutation(len(scene.source))
     shuffled = Level(
         points=scene.source.points[order], spacing=scene.source.spacing, viewpoint=scene.source.viewpoint
@@ -155,12 +122,18 @@ def check_permuted_points(stage: Any, slot: str) -> None:
     other = Scene(pair=scene.pair, source=shuffled, target=scene.target)
     one, two = _run(stage, slot, scene), _run(stage, slot, other)
     if slot == "overlap":
-        assert np.allclose(one.source[order], two.source, atol=1e-6), "the source's overlap depends on the order"
+        assert np.allclose(one.source[order], two.source, atol=1e-6), (
+            "the source's overlap depends on the order"
+        )
     if slot == "match":
-        assert abs(len(one) - len(two)) <= 0.2 * max(len(one), 20), "the number of matches depends on the order"
+        assert abs(len(one) - len(two)) <= 0.2 * max(len(one), 20), (
+            "the number of matches depends on the order"
+        )
     if slot in ("estimate", "refine"):
         error = _error_m(one.T, two.T, scene)
-        assert error < 0.5 or not (one.found and two.found), f"the pose moves by {error:.2f} m with the order of points"
+        assert error < 0.5 or not (one.found and two.found), (
+            f"the pose moves by {error:.2f} m with the order of points"
+        )
 
 
 def check_rigid_motion(stage: Any, slot: str) -> None:
@@ -171,7 +144,10 @@ def check_rigid_motion(stage: Any, slot: str) -> None:
     motion = se3.from_rt(se3.rotation_about(np.array([0.0, 0.0, 1.0])), np.array([3.0, -2.0, 0.5]))
     matches = true_matches(scene, truth)
     moved = Correspondences(
-        source=se3.apply(motion, matches.source), target=matches.target, weight=matches.weight, group=matches.group
+        source=se3.apply(motion, matches.source),
+        target=matches.target,
+        weight=matches.weight,
+        group=matches.group,
     )
     level = Level(points=se3.apply(motion, scene.source.points), spacing=scene.source.spacing)
     one = stage(scene, matches, np.random.default_rng(0))
@@ -204,18 +180,6 @@ def check_one_match(stage: Any, slot: str) -> None:
         scene, truth = sample_scene()
         one = true_matches(scene, truth, n=1)
         _valid(stage(scene, one, np.random.default_rng(0)), slot, scene, n_matches=1)
-
-
-def true_matches(scene: Scene, T: Array, n: int = 120) -> Correspondences:
-    """Right matches in eight groups, and one wrong match in five."""
-    rng = np.random.default_rng(0)
-    rows = np.sort(rng.choice(len(scene.source), n, replace=False))
-    source = scene.source.points[rows]
-    target = se3.apply(T, source)
-    wrong = rng.random(n) < (0.2 if n > 1 else 0.0)
-    target[wrong] += rng.uniform(-8.0, 8.0, (int(wrong.sum()), 3))
-    nearest_corner = 4 * (source[:, 0] > 0) + 2 * (source[:, 1] > 0) + (source[:, 2] > -1.0)
-    return Correspondences(source=source, target=target, weight=np.ones(n), group=nearest_corner.astype(np.int64))
 
 
 def _run(stage: Any, slot: str, scene: Scene | None = None) -> Any:
@@ -278,4 +242,6 @@ def _arrays(out: Any) -> list[Array]:
 
 
 def _error_m(A: Array, B: Array, scene: Scene) -> float:
-    return float(np.linalg.norm(se3.apply(A, scene.source.points) - se3.apply(B, scene.source.points), axis=1).mean())
+    return float(
+        np.linalg.norm(se3.apply(A, scene.source.points) - se3.apply(B, scene.source.points), axis=1).mean()
+    )

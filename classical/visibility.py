@@ -1,0 +1,114 @@
+# SPDX-License-Identifier: MIT
+"""Which points could the other sensor have seen, as far as that can be told before any pose is known?"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hybridreg.classical import ground
+from hybridreg.classical.ground import Ground
+from hybridreg.matches import Overlap
+from hybridreg.range_image import RangeImage
+from hybridreg.resolution import reach
+from hybridreg.scene import Level, Scene
+from hybridreg.stage import Stage
+
+Array = NDArray[np.float64]
+Side = Literal["source", "target"]
+
+# Share of a sensor's returns beyond its range or outside its vertical field of view, as here taken: strays.
+_STRAYS = 0.01
+# Places tried for the other sensor: rings of equal area, golden-angle turns, so that few cover the disc evenly.
+_N_PLACES = 24
+_GOLDEN = np.pi * (3.0 - np.sqrt(5.0))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Visibility(Stage):
+    """Probability that the other sensor, somewhere within `baseline` of this one, reaches a point.
+
+    For each point: the share of the places where the other sensor may have stood from which the point lies within
+    that sensor's range and, where both clouds show a ground, within its vertical field of view, at its own height
+    over the ground. The range is that of its farthest returns, the field of view that of its range image about the
+    normal of its own ground, so that a sensor may hang upside down or tilted.
+
+    What it cannot tell, and does not pretend to: which way the other sensor faced (a narrow fan thins no
+    direction of a full circle; the probability is that of a point which the fan is turned to), and what stood in
+    the way. A cloud without a viewpoint (put together from several places, or far from its origin) says nothing
+    about what its sensor could see, and the other cloud's points all count.
+
+    Parameters
+    ----------
+    baseline : float or None
+        How far apart the sensors may have stood, metres. None takes half of the shorter of the clouds' reaches
+        (`hybridreg.resolution.reach`).
+    """
+
+    baseline: float | None = None
+
+    def __post_init__(self) -> None:
+        if self.baseline is not None and not 0.0 <= self.baseline < np.inf:
+            raise ValueError(f"baseline={self.baseline} must be a length in metres, zero or more")
+
+    def __call__(self, scene: Scene) -> Overlap:
+        baseline = self.baseline
+        if baseline is None:
+            baseline = 0.5 * min(reach(scene.source.points), reach(scene.target.points))
+        return Overlap(_reached(scene, "source", baseline), _reached(scene, "target", baseline))
+
+
+def _reached(scene: Scene, side: Side, baseline: float) -> Array:
+    other: Side = "target" if side == "source" else "source"
+    level: Level = getattr(scene, side)
+    image = _image(scene, other)
+    if image is None or level.viewpoint is None:
+        return np.ones(len(level))
+    farthest = float(np.quantile(image.ranges, 1.0 - _STRAYS))
+    here, there = ground.find(scene, side), ground.find(scene, other)
+    if here is None or there is None:
+        return _within_range(level, farthest, baseline)
+    return _within_view(level, here, image, there, farthest, baseline)
+
+
+def _image(scene: Scene, side: Side) -> RangeImage | None:
+    cloud = getattr(scene.pair, side)
+    viewpoint = cloud.viewpoint
+    if viewpoint is None:
+        return None
+    image = scene.shared(("range image", side), lambda: RangeImage.of(cloud.points, viewpoint))
+    return image if image.from_one_place else None
+
+
+def _within_range(level: Level, farthest: float, baseline: float) -> Array:
+    # Without a vertical the disc may lie in any plane; the share is that of a place somewhere on the line through
+    # the point, which depends on the distance alone.
+    distance = np.linalg.norm(level.points - level.viewpoint, axis=1)
+    return np.clip((farthest + baseline - distance) / max(2.0 * baseline, 1e-9), 0.0, 1.0)
+
+
+def _within_view(
+    level: Level, here: Ground, image: RangeImage, there: Ground, farthest: float, baseline: float
+) -> Array:
+    low, high = np.quantile(image.directions @ there.up, [_STRAYS, 1.0 - _STRAYS])
+    low, high = np.sin(np.arcsin(np.clip([low, high], -1.0, 1.0)) + image.resolution * np.array([-1.0, 1.0]))
+    eye = float(there.above(image.viewpoint[None])[0])
+    up = here.above(level.points) - eye
+    flat = level.points - level.viewpoint
+    flat = flat - np.outer(flat @ here.up, here.up)
+    seen = np.zeros(len(level))
+    for place in _places(here.up, baseline):
+        distance = np.sqrt(np.sum((flat - place) ** 2, axis=1) + up**2)
+        sine = up / np.maximum(distance, 1e-9)
+        seen += (distance <= farthest) & (sine >= low) & (sine <= high)
+    return seen / _N_PLACES
+
+
+def _places(up: Array, radius: float) -> Array:
+    across = np.linalg.svd(up[None])[2][1:]
+    i = np.arange(_N_PLACES)
+    r, turn = radius * np.sqrt((i + 0.5) / _N_PLACES), _GOLDEN * i
+    return np.column_stack([r * np.cos(turn), r * np.sin(turn)]) @ across

@@ -1,0 +1,188 @@
+# SPDX-License-Identifier: MIT
+"""What a sensor saw from where it stood: in each direction, how far it looked.
+
+A grid of rows and columns suits one kind of sensor in one orientation. Here the directions themselves are the
+image: returns thinned to cells of equal angle on the sphere, and a KD-tree over them. Rings, fans, rosettes and
+hemispheres, upright or not, are all the same to it, and a turned cloud gives the same answers.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntEnum
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+# The finest and coarsest cell, radians: below half a degree two clouds cannot be compared anyway, and beyond
+# four degrees a few stray returns would pass for a field of view.
+_FINEST, _COARSEST = np.radians(0.5), np.radians(4.0)
+# Cells are as wide as the gaps between returns when doubling them covers less than this much more of the sky. It
+# would be 1 for a sharp-edged field of view with even rings; uneven rings and ragged edges add to it.
+_FILLED = 1.5
+# Of the returns of one sensor in one place at least this share is smooth (0.73 in the roughest real cloud, woods);
+# three scans of a street laid together came to 0.56.
+_LEAST_SMOOTH = 0.65
+_BITS = 12  # of a cell's index along one axis
+# Steeper than this a surface is seen edge-on, and how far a ray beside the point looks says nothing, degrees.
+_EDGE_ON_DEG = 75.0
+# Neighbouring directions whose ranges agree within this share lie on one surface.
+_SMOOTH = 0.1
+
+
+class Seen(IntEnum):
+    """What a sensor tells about a place."""
+
+    UNSEEN = 0  # it did not look there, or nothing came back
+    SEEN = 1  # it got a return from there
+    FREE = 2  # it looked through, and hit something behind
+    HIDDEN = 3  # something before it stood in the way
+
+
+@dataclass(frozen=True, eq=False)
+class RangeImage:
+    """Returns of one cloud by direction.
+
+    Attributes
+    ----------
+    viewpoint : (3,) float64
+    directions : (n, 3) float64, unit length
+    ranges : (n,) float64, metres
+    resolution : float
+        Angle between neighbouring rays across the widest regular gap (between rings), radians.
+    smoothness : float in [0, 1]
+        Share of returns whose neighbour in direction is at about the same range. From the sensor's true place
+        nearly all are; from another place, or for a cloud put together of several scans, near and far mix.
+    """
+
+    viewpoint: Array
+    directions: Array
+    ranges: Array
+    resolution: float
+    smoothness: float
+    tree: cKDTree
+
+    @classmethod
+    def of(cls, points: Array, viewpoint: Array) -> RangeImage:
+        """Image of `points` (N, 3) about `viewpoint` (3,).
+
+        Raises
+        ------
+        ValueError
+            If no point lies apart from the viewpoint.
+        """
+        ray = points - viewpoint
+        reach = np.sqrt(np.einsum("ni,ni->n", ray, ray))
+        apart = reach > 1e-6
+        if not apart.any():
+            raise ValueError("range image: every point lies at the viewpoint")
+        reach = reach[apart]
+        directions = ray[apart] / reach[:, None]
+        resolution = angular_resolution(directions)
+        kept = _thin(directions, reach, max(0.5 * resolution, _FINEST))
+        directions, reach = directions[kept], reach[kept]
+        tree = cKDTree(directions, balanced_tree=False, compact_nodes=False)
+        smoothness = _smoothness(tree, directions, reach)
+        return cls(np.asarray(viewpoint, dtype=np.float64), directions, reach, resolution, smoothness, tree)
+
+    @property
+    def from_one_place(self) -> bool:
+        """Whether the returns can be those of one sensor at the viewpoint: else "looked through" means nothing."""
+        return self.smoothness >= _LEAST_SMOOTH
+
+    def look(
+        self, points: Array, normals: Array | None = None, *, margin: float, reach: float = np.inf, k: int = 4
+    ) -> NDArray[np.int8]:
+        """Tell of each point (m, 3) whether this sensor saw it.
+
+        Parameters
+        ----------
+        normals : (m, 3) or None
+            Of the surfaces that the points lie on; without them a surface is taken to face the sensor at 45 degrees.
+        margin : float
+            Metres by which two ranges of one surface may differ.
+        reach : float
+            Metres that the surface extends sideways from a point. A ray that passes the point further away might
+            miss the surface, and tells nothing.
+        k : int
+            Nearest rays that are asked. One that stops at the point is enough for SEEN; all must go on behind it
+            for FREE, so that a ray beside a narrow thing does not deny it.
+
+        Returns
+        -------
+        (m,) int8 of `Seen`
+        """
+        ray = points - self.viewpoint
+        r = np.maximum(np.sqrt(np.einsum("ni,ni->n", ray, ray)), 1e-9)
+        k = min(k, len(self.ranges))
+        angle, index = self.tree.query(
+            ray / r[:, None], k=np.arange(1, k + 1), distance_upper_bound=1.5 * self.resolution
+        )
+        sideways = r[:, None] * angle
+        asked = np.isfinite(angle) & (sideways <= reach)
+        behind = self.ranges[np.minimum(index, len(self.ranges) - 1)] - r[:, None]
+        slack = margin + np.where(asked, sideways, 0.0) * _slope(ray / r[:, None], normals)[:, None]
+        seen = (asked & (np.abs(behind) <= slack)).any(axis=1)
+        free = ~(asked & (behind <= slack)).any(axis=1)
+        state = np.where(seen, Seen.SEEN, np.where(free, Seen.FREE, Seen.HIDDEN))
+        return np.where(asked.any(axis=1), state, Seen.UNSEEN).astype(np.int8)
+
+
+def angular_resolution(directions: Array) -> float:
+    """Angle in radians at which cells on the sphere are as wide as the gaps between returns (n, 3).
+
+    While cells are finer than the gaps between rings, doubling them doubles the part of the sky that counts as
+    seen; once they are wider it hardly grows. The doubling stops there.
+    """
+    angle = _FINEST
+    cells = np.unique(_cells(directions, angle))
+    while angle < _COARSEST:
+        coarser = np.unique(_merged(cells))
+        if 4 * len(coarser) < _FILLED * len(cells):
+            break
+        angle, cells = 2 * angle, coarser
+    return float(angle)
+
+
+def _cells(directions: Array, angle: float) -> Integers:
+    # A cube grid cut by the sphere: the same in every orientation but for a factor, no poles, no seam.
+    x, y, z = ((np.ascontiguousarray(directions.T) + 1.0) / angle).astype(np.int64)
+    return (x << 2 * _BITS) | (y << _BITS) | z
+
+
+def _merged(cells: Integers) -> Integers:
+    mask = (1 << _BITS) - 1
+    x, y, z = cells >> 2 * _BITS, (cells >> _BITS) & mask, cells & mask
+    return ((x >> 1) << 2 * _BITS) | ((y >> 1) << _BITS) | (z >> 1)
+
+
+def _thin(directions: Array, ranges: Array, angle: float) -> Integers:
+    # One number to sort by: the cell, then the range in steps of a 16-millionth.
+    steps = (ranges * ((2.0**24 - 1) / ranges.max())).astype(np.int64)
+    cell = _cells(directions, angle)
+    order = np.argsort((cell << 24) | steps)
+    change = np.flatnonzero(np.diff(cell[order]))
+    near = order[np.concatenate([[0], change + 1])]
+    far = order[np.concatenate([change, [len(order) - 1]])]
+    # The farthest return too where it lies on another surface: a cell on an edge must tell of both.
+    return np.concatenate([near, far[ranges[far] > (1.0 + _SMOOTH) * ranges[near]]])
+
+
+def _smoothness(tree: cKDTree, directions: Array, ranges: Array) -> float:
+    step = max(1, len(ranges) // 2_000)
+    _, index = tree.query(directions[::step], k=[2], workers=-1)
+    neighbour = ranges[np.minimum(index[:, 0], len(ranges) - 1)]
+    return float(np.mean(np.abs(np.log(neighbour / ranges[::step])) < _SMOOTH))
+
+
+def _slope(rays: Array, normals: Array | None) -> Array:
+    # How much the range of a surface changes per metre sideways: the tangent of the angle of incidence.
+    if normals is None:
+        return np.ones(len(rays))
+    cosine = np.abs(np.einsum("ni,ni->n", rays, normals))
+    cosine = np.maximum(cosine, np.cos(np.radians(_EDGE_ON_DEG)))
+    return np.sqrt(1.0 - cosine**2) / cosine

@@ -1,0 +1,135 @@
+# SPDX-License-Identifier: MIT
+"""What two clouds say about one pose: where both sensors looked, did they see the same surfaces?
+
+A share of all points is a poor judge. Points that the other sensor could not see lower it for a right pose, and the
+ground raises it for a wrong one. So only points that the other sensor looked at are counted, and they are counted
+apart for three directions of normals: the ground holds the height, the walls along a street hold it across, and the
+few surfaces that face along the street decide whether the clouds may slide.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hybridreg import se3
+from hybridreg.range_image import Seen
+from hybridreg.verdict.views import View
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+# In units of the evidence's spacing: how near a point must come to count as covered (in space) and as agreeing
+# (across the other surface), how far two ranges of one surface may differ, and how far a surface reaches sideways.
+_COVERED, _ACROSS, _MARGIN, _REACH = 2.0, 0.5, 1.0, 1.0
+# Normals of one surface estimated twice, from different sensors' samples, seldom differ by more than 45 degrees.
+_SAME_NORMAL = float(np.cos(np.radians(45.0)))
+# Points looked at for nothing, added to every count: so few agreeing points are a coincidence.
+_FEW = 20.0
+# Without a range image a point counts as looked at where the other cloud has anything within so many spacings.
+_SURROUNDED = 6.0
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class OneWay:
+    """The asked points of one cloud, laid on the other.
+
+    looked : (m,) bool, the other sensor looked at the place or through it
+    free : (m,) bool, it looked through
+    hidden : (m,) bool, something stood before it
+    covered : (m,) bool, the other cloud has a point near by
+    agrees : (m,) bool, covered, on the same surface, with the same normal
+    match : (m,) int64, row of the nearest point of the other cloud where covered, else -1
+    moved, normals : (m, 3) float64, in the other cloud's frame
+    """
+
+    looked: Mask
+    free: Mask
+    hidden: Mask
+    covered: Mask
+    agrees: Mask
+    match: NDArray[np.int64]
+    moved: Array
+    normals: Array
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Agreement:
+    """Both clouds under one pose.
+
+    axes : (3, 3) float64, rows: main directions of the normals in the target's frame, the commonest first
+    looked, agreed, through : (3,) float64, points that face each axis: looked at by the other sensor, agreeing, and
+        looked through; both clouds together
+    """
+
+    source: OneWay
+    target: OneWay
+    axes: Array
+    looked: Array
+    agreed: Array
+    through: Array
+
+    @property
+    def shares(self) -> Array:
+        """Agreeing share (3,) of the points looked at, for each axis; few points count for little."""
+        return self.agreed / (self.looked + _FEW)
+
+    @property
+    def looked_through(self) -> float:
+        """Share of the points looked at that a sensor looked through."""
+        return float(self.through.sum() / (self.looked.sum() + _FEW))
+
+
+def compare(source: View, target: View, T_target_source: Array, spacing: float, every: int = 1) -> Agreement:
+    """Evidence for one pose, from each cloud's asked points or from `every` so-many-th of them."""
+    rows_source, rows_target = source.asked[::every], target.asked[::every]
+    forward = one_way(source, rows_source, target, T_target_source, spacing)
+    backward = one_way(target, rows_target, source, se3.inverse(T_target_source), spacing)
+    facing = (forward.normals, target.normals[rows_target])
+    axes = np.linalg.eigh(sum(n.T @ n / len(n) for n in facing))[1].T[::-1]
+    looked, agreed, through = np.zeros(3), np.zeros(3), np.zeros(3)
+    for way, normals in zip((forward, backward), facing, strict=True):
+        axis = np.argmax(np.abs(normals @ axes.T), axis=1)
+        for count, mask in ((looked, way.looked), (agreed, way.looked & way.agrees), (through, way.free)):
+            count += np.bincount(axis[mask], minlength=3)
+    return Agreement(
+        source=forward,
+        target=backward,
+        axes=axes,
+        looked=every * looked,
+        agreed=every * agreed,
+        through=every * through,
+    )
+
+
+def one_way(a: View, rows: NDArray[np.int64], b: View, T_b_a: Array, spacing: float) -> OneWay:
+    """Lay some rows of `a` on `b`."""
+    moved = se3.apply(T_b_a, a.points[rows])
+    normals = a.normals[rows] @ T_b_a[:3, :3].T
+    limit = _COVERED if b.image is not None else _SURROUNDED
+    distance, match = b.tree.query(moved, distance_upper_bound=limit * spacing)
+    covered = distance < _COVERED * spacing
+    row = np.where(covered, match, 0)
+    other = b.normals[row]
+    across = np.abs(np.einsum("ni,ni->n", moved - b.points[row], other))
+    parallel = np.abs(np.einsum("ni,ni->n", normals, other)) > _SAME_NORMAL
+    agrees = covered & (across < _ACROSS * spacing) & parallel
+    if b.image is None:
+        looked = np.isfinite(distance)
+        free = hidden = np.zeros(len(moved), dtype=bool)
+    else:
+        state = b.image.look(moved, normals, margin=_MARGIN * spacing, reach=_REACH * spacing)
+        free, hidden = state == Seen.FREE, state == Seen.HIDDEN
+        looked = free | (state == Seen.SEEN)
+    return OneWay(
+        looked=looked,
+        free=free,
+        hidden=hidden,
+        covered=covered,
+        agrees=agrees,
+        match=np.where(covered, match, -1).astype(np.int64),
+        moved=moved,
+        normals=normals,
+    )

@@ -1,0 +1,37 @@
+# SPDX-License-Identifier: MIT
+"""From evidence to a probability that the pose is right.
+
+A logistic rule on four numbers. Its weights are those of a logistic regression on simulated scenes only (streets,
+crossings, yards, woods, rooms, corridors; seven sensors; right poses against half turns, slides, the best of many
+random starts, and clouds of different places), rounded; `tests/verdict/worlds.py` is the simulator. A later model,
+calibrated on more data, takes the same evidence.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Literal
+
+import numpy as np
+
+Word = Literal["ok", "doubtful", "failed"]
+
+OK, FAILED = 0.95, 0.5
+# Per unit of each number; all four are shares between 0 and 1.
+WEIGHTS = {"agreement_least": 3.0, "agreement_middle": 1.0, "looked_through": -13.0, "rival_margin": -9.0}
+INTERCEPT = -0.9
+# A rival that is far behind, or far ahead, says no more than one that is this far.
+MARGIN_COUNTS = 0.3
+
+
+def confidence(evidence: Mapping[str, float]) -> float:
+    """Probability in (0, 1) that the pose is right."""
+    margin = float(np.clip(evidence["rival_margin"], -MARGIN_COUNTS, MARGIN_COUNTS))
+    numbers = {**evidence, "rival_margin": margin}
+    score = INTERCEPT + sum(weight * numbers[name] for name, weight in WEIGHTS.items())
+    return float(1.0 / (1.0 + np.exp(-score)))
+
+
+def word(probability: float) -> Word:
+    """Verdict of a probability: at least 0.95 is "ok", less than one half is "failed"."""
+    return "ok" if probability >= OK else "failed" if probability < FAILED else "doubtful"

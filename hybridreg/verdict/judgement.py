@@ -1,0 +1,170 @@
+# SPDX-License-Identifier: MIT
+"""The verdict on a pose."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from hybridreg import se3
+from hybridreg.fitness import Fitness, measure
+from hybridreg.matches import Correspondences, Pose
+from hybridreg.scene import Scene
+from hybridreg.verdict import information, rivals, views
+from hybridreg.verdict.agreement import Agreement, OneWay, compare
+from hybridreg.verdict.confidence import Word, confidence, word
+from hybridreg.verdict.information import Information
+from hybridreg.verdict.rivals import Rival
+from hybridreg.verdict.views import View
+from hybridreg.verdict.words import reasons
+
+Array = NDArray[np.float64]
+
+# A rival explains the data nearly as well when its support comes within this of the pose's. In simulated scenes
+# one in twenty right poses had such a rival, nearly all of them in bare corridors.
+NEARLY = 0.1
+# With nothing to say against the pose and nothing for it either.
+_NO_RIVAL = -1.0
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Judgement:
+    """Whether to believe a pose, and why.
+
+    Attributes
+    ----------
+    verdict : "ok", "doubtful" or "failed"
+    confidence : float in [0, 1]
+    reasons : tuple of str
+    evidence : dict of str to float
+        Always the same keys, see `evidence_of`.
+    fitness : Fitness
+        Of the whole source cloud on the whole target cloud, as Open3D's `evaluate_registration`.
+    fitness_target : float
+        Share of the target's points that have a source point within `max_distance`.
+    max_distance : float
+        Metres: twice the scene's spacing.
+    information : (6, 6) float64
+        See `hybridreg.verdict.information.Information`.
+    rivals : (r, 4, 4) float64
+        Poses that explain the data nearly as well, best first.
+    """
+
+    verdict: Word
+    confidence: float
+    reasons: tuple[str, ...]
+    evidence: dict[str, float]
+    fitness: Fitness
+    fitness_target: float
+    max_distance: float
+    information: Array
+    rivals: Array
+
+
+def judge(scene: Scene, pose: Pose, matches: Correspondences) -> Judgement:
+    """Judge a pose between the levels' frames by what both clouds say about it.
+
+    The evidence is taken at a resolution of its own (`hybridreg.resolution.default_voxel`), so that it means the
+    same whatever voxel the pipeline used. A pose that was not found is judged as what it is, a placeholder: failed.
+    """
+    source, target = views.views(scene)
+    spacing = views.spacing(scene)
+    agreement = compare(source, target, pose.T, spacing)
+    held = information.measure(agreement, target)
+    found = rivals.find(source, target, pose.T, agreement, held, pose.rivals, spacing) if pose.found else []
+    evidence = evidence_of(agreement, held, found, target)
+    evidence["matches_agreeing"] = _agreeing(matches, pose.T, 2.0 * scene.spacing)
+    probability = confidence(evidence) if pose.found else 0.0
+    max_distance = 2.0 * scene.spacing
+    fitness, fitness_target = _fitness(scene, pose.T, max_distance)
+    return Judgement(
+        verdict=word(probability),
+        confidence=probability,
+        reasons=reasons(evidence, agreement, held, found=pose.found, images=_images(source, target)),
+        evidence=evidence,
+        fitness=fitness,
+        fitness_target=fitness_target,
+        max_distance=max_distance,
+        information=held.matrix,
+        rivals=_close(found, rivals.support(agreement)),
+    )
+
+
+def evidence_of(
+    agreement: Agreement, held: Information, found: list[Rival], target: View
+) -> dict[str, float]:
+    """The numbers behind a verdict; shares lie between 0 and 1.
+
+    agreement_least, _middle, _most : agreeing share of the points that the other sensor looked at, for the axis
+        where it is least, the middle one, and the one where it is most
+    looked_least : points looked at for the axis with the fewest
+    looked_through, looked_through_source, _target : share of those that a sensor looked through; both clouds
+        together, and the points of one cloud
+    visible_source, visible_target : share of a cloud's points that the other sensor looked at
+    hidden_source, hidden_target : share that stood behind something
+    fitness_visible_source, fitness_visible_target : share of the visible points with a point near by
+    normals : mean cosine between the normals of points and their neighbours
+    inlier_rmse : of the agreeing points to the other cloud's planes, metres
+    weakest : smallest eigenvalue of the information per point, at most 1/3
+    support, rival_margin : of the pose, and how far the best rival's lies above it (-1 without rivals)
+    """
+    support = rivals.support(agreement)
+    least, middle, most = np.sort(agreement.shares)
+    evidence = {
+        "agreement_least": least,
+        "agreement_middle": middle,
+        "agreement_most": most,
+        "looked_least": agreement.looked.min(),
+        "looked_through": agreement.looked_through,
+        "weakest": held.weakest,
+        "support": support,
+        "rival_margin": found[0].support - support if found else _NO_RIVAL,
+        **_surfaces(agreement.source, target),
+    }
+    for name, way in (("source", agreement.source), ("target", agreement.target)):
+        evidence[f"visible_{name}"] = np.mean(way.looked)
+        evidence[f"hidden_{name}"] = np.mean(way.hidden)
+        evidence[f"looked_through_{name}"] = _share(way.free, way.looked)
+        evidence[f"fitness_visible_{name}"] = _share(way.covered & way.looked, way.looked)
+    return {name: float(value) for name, value in evidence.items()}
+
+
+def _surfaces(way: OneWay, target: View) -> dict[str, float]:
+    near, row = way.covered, way.match
+    cosine = np.abs(np.sum(way.normals[near] * target.normals[row[near]], axis=1))
+    agrees = way.agrees
+    across = np.sum((way.moved[agrees] - target.points[row[agrees]]) * target.normals[row[agrees]], axis=1)
+    return {
+        "normals": float(cosine.mean()) if near.any() else 0.0,
+        "inlier_rmse": float(np.sqrt(np.mean(across**2))) if agrees.any() else 0.0,
+    }
+
+
+def _share(part: NDArray[np.bool_], whole: NDArray[np.bool_]) -> float:
+    return float(np.count_nonzero(part) / max(np.count_nonzero(whole), 1))
+
+
+def _agreeing(matches: Correspondences, T: Array, distance: float) -> float:
+    gap = np.linalg.norm(se3.apply(T, matches.source) - matches.target, axis=1)
+    return float(np.count_nonzero(gap < distance))
+
+
+def _images(source: View, target: View) -> tuple[str, ...]:
+    return tuple(name for name, view in (("source", source), ("target", target)) if view.image is not None)
+
+
+def _fitness(scene: Scene, T: Array, max_distance: float) -> tuple[Fitness, float]:
+    source, target = scene.pair.source.points, scene.pair.target.points
+    tree_source = scene.shared(("cloud tree", "source"), lambda: cKDTree(source, balanced_tree=False))
+    tree_target = scene.shared(("cloud tree", "target"), lambda: cKDTree(target, balanced_tree=False))
+    return (
+        measure(source, tree_target, T, max_distance),
+        measure(target, tree_source, se3.inverse(T), max_distance).fitness,
+    )
+
+
+def _close(found: list[Rival], support: float) -> Array:
+    return np.array([rival.T for rival in found if rival.support > support - NEARLY]).reshape(-1, 4, 4)

@@ -1,0 +1,102 @@
+# SPDX-License-Identifier: MIT
+"""Other poses that might explain the data: half a turn, a slide along the street, and what the estimator offers."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hybridreg import se3
+from hybridreg.verdict.agreement import Agreement, compare
+from hybridreg.verdict.information import Information
+from hybridreg.verdict.views import View
+
+Array = NDArray[np.float64]
+
+# Rivals that the estimator offers, the best first; how many of all are looked at closely.
+_OFFERED, _CLOSELY = 4, 3
+# Slides along the direction that is held least, in spacings: about 4 and 8 m outdoors, 1 and 2 m in a room.
+_SLIDES = (-16.0, -8.0, 8.0, 16.0)
+# Nearer than this (spacings, degrees) a rival is the pose itself.
+_APART, _TURNED = 3.0, 5.0
+_QUICK, _CLOSE = 5, 2
+
+
+class Rival(NamedTuple):
+    """A pose (4, 4) and its support."""
+
+    T: Array
+    support: float
+
+
+def support(agreement: Agreement) -> float:
+    """One number to rank poses by, at most 1: agreement along the axis where it is least, less the share that the
+    sensors looked through. Both were about as telling in simulated scenes (`confidence.py`)."""
+    return float(agreement.shares.min() - agreement.looked_through)
+
+
+def find(
+    source: View,
+    target: View,
+    T: Array,
+    agreement: Agreement,
+    information: Information,
+    offered: Array,
+    spacing: float,
+) -> list[Rival]:
+    """Settled rivals of pose T, the best supported first.
+
+    Parameters
+    ----------
+    offered : (r, 4, 4)
+        Rivals that the estimator knows of.
+    """
+    from hybridreg.verdict.settle import settle
+
+    guesses = [
+        *offered[:_OFFERED],
+        *_turned(source, target, T, agreement, information),
+        *_slid(T, agreement, spacing),
+    ]
+    guesses = [guess for guess in guesses if _differs(guess, T, information.centre, spacing)]
+    promising = sorted(guesses, key=lambda G: -support(compare(source, target, G, spacing, every=_QUICK)))
+    settled = [settle(source, target, G, spacing) for G in promising[:_CLOSELY]]
+    found = [
+        Rival(G, support(compare(source, target, G, spacing, every=_CLOSE)))
+        for G in settled
+        if _differs(G, T, information.centre, spacing)
+    ]
+    return sorted(found, key=lambda rival: -rival.support)
+
+
+def _turned(
+    source: View, target: View, T: Array, agreement: Agreement, information: Information
+) -> list[Array]:
+    # Half a turn through the centre of the overlap about the axis that most surfaces face (the vertical, where there
+    # is ground); and about each axis so that the middles of both clouds meet, which is where a room repeats.
+    axes, centre = agreement.axes, information.centre
+    about = [
+        se3.from_rt(half, centre - half @ centre) @ T
+        for half in (se3.rotation_about(np.pi * axis) for axis in axes)
+    ]
+    middle = _middle(target.points, axes)
+    met = [se3.from_rt(np.eye(3), middle - _middle(se3.apply(G, source.points), axes)) @ G for G in about]
+    return [about[0], *met]
+
+
+def _middle(points: Array, axes: Array) -> Array:
+    # Midway between the outer twentieths along each axis: a centroid would follow the sensor.
+    low, high = np.quantile(points[:: max(1, len(points) // 2_000)] @ axes.T, [0.05, 0.95], axis=0)
+    return 0.5 * (low + high) @ axes
+
+
+def _slid(T: Array, agreement: Agreement, spacing: float) -> list[Array]:
+    return [se3.from_rt(np.eye(3), length * spacing * agreement.axes[2]) @ T for length in _SLIDES]
+
+
+def _differs(rival: Array, T: Array, centre: Array, spacing: float) -> bool:
+    step = rival @ se3.inverse(T)
+    moved = float(np.linalg.norm(se3.apply(step, centre[None])[0] - centre))
+    return moved > _APART * spacing or se3.angle_deg(step[:3, :3]) > _TURNED

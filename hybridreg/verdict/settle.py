@@ -1,0 +1,45 @@
+# SPDX-License-Identifier: MIT
+"""A few steps of point-to-plane ICP: a rival pose must be judged where it fits best, not where it was guessed."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hybridreg import se3
+from hybridreg.verdict.information import jacobian
+from hybridreg.verdict.views import View
+
+Array = NDArray[np.float64]
+
+# Search distances of the steps, in spacings: wide enough to pull in a guess that is some cells off, then tight.
+_STEPS = (6.0, 4.0, 3.0, 2.0, 2.0)
+_FEWEST = 30
+
+
+def settle(source: View, target: View, T: Array, spacing: float, every: int = 3) -> Array:
+    """Pose (4, 4) near T at which the source's asked points lie best on the target's planes."""
+    rows = source.asked[::every]
+    for step in _STEPS:
+        moved = se3.apply(T, source.points[rows])
+        distance, match = target.tree.query(moved, distance_upper_bound=step * spacing)
+        hit = np.isfinite(distance)
+        if np.count_nonzero(hit) < _FEWEST:
+            return T
+        points, match = moved[hit], match[hit]
+        normals = target.normals[match]
+        gap = np.einsum("ni,ni->n", points - target.points[match], normals)
+        # Cauchy weights: half of the neighbours of a wrong guess are no neighbours.
+        weight = 1.0 / (1.0 + (gap / spacing) ** 2)
+        centre = points.mean(axis=0)
+        J = jacobian(points - centre, normals)
+        H = (J * weight[:, None]).T @ J
+        twist = -np.linalg.solve(H + 1e-6 * np.trace(H) * np.eye(6), J.T @ (weight * gap))
+        T = _about(centre, twist) @ T
+    return T
+
+
+def _about(centre: Array, twist: Array) -> Array:
+    step = se3.exp(twist)
+    step[:3, 3] += centre - step[:3, :3] @ centre
+    return step

@@ -1,0 +1,92 @@
+# SPDX-License-Identifier: MIT
+"""One cloud as the verdict looks at it: surfaces at a resolution of its own, and what the sensor saw."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from hybridreg import normals
+from hybridreg.range_image import RangeImage
+from hybridreg.resolution import default_voxel
+from hybridreg.scene import Level, Scene
+
+Array = NDArray[np.float64]
+Side = Literal["source", "target"]
+
+# The evidence must mean the same whatever voxel the pipeline used, so it has its own; a level that comes near
+# enough is used as it is, with the normals and the tree that other stages already computed.
+_NEAR_ENOUGH = 1.5
+_MOST_POINTS = 20_000
+# Points that are asked about, spread evenly over the level: a share of 3,000 is good to one percent.
+_N_ASKED = 3_000
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class View:
+    """Surfaces of one cloud.
+
+    Attributes
+    ----------
+    points, normals : (n, 3) float64
+    planarity : (n,) float64
+    tree : KD-tree of the points
+    image : RangeImage or None
+        None where the sensor's place is not known.
+    asked : (m,) int64
+        Rows that are compared with the other cloud.
+    """
+
+    points: Array
+    normals: Array
+    planarity: Array
+    tree: cKDTree
+    image: RangeImage | None
+    asked: NDArray[np.int64]
+
+
+def views(scene: Scene) -> tuple[View, View]:
+    """Source and target of a scene, made once a run."""
+    return scene.shared(("verdict", "source"), lambda: _view(scene, "source")), scene.shared(
+        ("verdict", "target"), lambda: _view(scene, "target")
+    )
+
+
+def spacing(scene: Scene) -> float:
+    """Resolution of the evidence, metres."""
+    pair = scene.pair
+    return scene.shared(("verdict", "spacing"), lambda: default_voxel(pair.source.points, pair.target.points))
+
+
+def _view(scene: Scene, side: Side) -> View:
+    level: Level = getattr(scene, side)
+    wanted = spacing(scene)
+    if len(level) <= _MOST_POINTS and 1 / _NEAR_ENOUGH < level.spacing / wanted < _NEAR_ENOUGH:
+        points, tree, surface = level.points, normals.tree(scene, side), normals.surface(scene, side)
+    else:
+        from hybridreg.classical.voxel import voxel_centroids
+
+        points = voxel_centroids(getattr(scene.pair, side).points, wanted)
+        tree, surface = cKDTree(points), normals.estimate(points, level.viewpoint)
+    asked = np.unique(np.linspace(0, len(points) - 1, min(_N_ASKED, len(points))).astype(np.int64))
+    return View(
+        points=points,
+        normals=surface.normals,
+        planarity=surface.planarity,
+        tree=tree,
+        image=_image(scene, side),
+        asked=asked,
+    )
+
+
+def _image(scene: Scene, side: Side) -> RangeImage | None:
+    cloud = getattr(scene.pair, side)
+    viewpoint = cloud.viewpoint
+    if viewpoint is None:
+        return None
+    image = scene.shared(("range image", side), lambda: RangeImage.of(cloud.points, viewpoint))
+    return image if image.from_one_place else None

@@ -1,0 +1,78 @@
+# SPDX-License-Identifier: MIT
+"""The evidence in sentences, the gravest first."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+
+from hybridreg.verdict.agreement import Agreement
+from hybridreg.verdict.information import Information
+
+# Where a number becomes worth a sentence. In simulated scenes nine in ten right poses stayed on the good side.
+LOOKED_THROUGH, AGREEMENT, WEAK, NEARLY, OVERLAP, FEW = 0.12, 0.3, 0.02, 0.1, 0.15, 60
+
+
+def reasons(
+    evidence: Mapping[str, float],
+    agreement: Agreement,
+    held: Information,
+    *,
+    found: bool,
+    images: tuple[str, ...],
+) -> tuple[str, ...]:
+    """Why the verdict is what it is; never empty."""
+    if not found:
+        return ("no pose was found: the estimator had nothing to work with, and returned the identity",)
+    against = (*_against(evidence, agreement, held), *_unknown(images))
+    return (*against, _in_favour(evidence)) if against else (_in_favour(evidence),)
+
+
+def _against(evidence: Mapping[str, float], agreement: Agreement, held: Information) -> Iterator[str]:
+    through = evidence["looked_through"]
+    if through > LOOKED_THROUGH:
+        yield (
+            f"the sensors looked through {through:.0%} of the points that they should have hit "
+            f"({evidence['looked_through_source']:.0%} of the source's, "
+            f"{evidence['looked_through_target']:.0%} of the target's)"
+        )
+    k = int(np.argmin(agreement.shares))
+    if agreement.shares[k] < AGREEMENT:
+        yield _about_axis(agreement, k)
+    margin = evidence["rival_margin"]
+    if margin > 0.0:
+        yield f"another pose explains the data better (its support is higher by {margin:.2f}; see rivals)"
+    elif margin > -NEARLY:
+        yield f"another pose explains the data nearly as well (its support is lower by {-margin:.2f}; see rivals)"
+    if held.weakest < WEAK:
+        yield f"little holds the clouds {held.words}: {held.weakest:.1%} of the surfaces' information"
+    overlap = max(evidence["visible_source"], evidence["visible_target"])
+    if overlap < OVERLAP:
+        yield f"little overlap: neither sensor looked at more than {overlap:.0%} of the other's points"
+
+
+def _about_axis(agreement: Agreement, k: int) -> str:
+    direction = " ".join(f"{x:.2f}" for x in agreement.axes[k])
+    looked, agreed = int(agreement.looked[k]), int(agreement.agreed[k])
+    if looked < FEW:
+        return f"only {looked} points that both sensors could see face along ({direction}) of the target, {agreed} agree"
+    return f"of {looked} points that face along ({direction}) of the target and were looked at, only {agreed} agree"
+
+
+def _unknown(images: tuple[str, ...]) -> Iterator[str]:
+    for name in ("source", "target"):
+        if name not in images:
+            yield (
+                f"the place of the {name}'s sensor is not known (its origin lies outside the cloud, or near and far "
+                "mix in one direction): what it looked through could not be tested"
+            )
+
+
+def _in_favour(evidence: Mapping[str, float]) -> str:
+    return (
+        f"of the points that the other sensor looked at, {evidence['fitness_visible_source']:.0%} of the source's and "
+        f"{evidence['fitness_visible_target']:.0%} of the target's have a neighbour there; "
+        f"{evidence['agreement_least']:.0%} or more agree along each axis, {evidence['looked_through']:.0%} were looked "
+        "through"
+    )
