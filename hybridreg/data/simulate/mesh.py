@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 from hybridreg.data.simulate.materials import MATERIAL_INDEX
 
 Tint = tuple[float, float, float]
+Colour = Sequence[float] | NDArray[Any]  # red, green, blue in [0,1]
 
 
 @dataclass(frozen=True)
@@ -24,7 +26,7 @@ class Mesh:
     tint: NDArray[np.float32]
 
     @staticmethod
-    def of(vertices: np.ndarray, faces: np.ndarray, material: str, tint: Sequence[float]) -> Mesh:
+    def of(vertices: np.ndarray, faces: np.ndarray, material: str, tint: Colour) -> Mesh:
         """One piece of one material."""
         n = len(faces)
         return Mesh(

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from hybridreg.data.simulate.mesh import Mesh
+from hybridreg.data.simulate.mesh import Colour, Mesh
 
 _BOX = np.array(
     [[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0], [-1, -1, 1], [1, -1, 1], [1, 1, 1], [-1, 1, 1]]
@@ -34,7 +34,7 @@ def _repeat(template: np.ndarray, copies: int, stride: int) -> np.ndarray:
 
 
 def boxes(
-    base: np.ndarray, size: np.ndarray, yaw: float | np.ndarray, material: str, tint: Sequence[float]
+    base: np.ndarray, size: np.ndarray, yaw: float | np.ndarray, material: str, tint: Colour
 ) -> Mesh:
     """Boxes standing on `base` (n,3) with edges `size` (n,3), turned by `yaw` (n,) radians; open below."""
     base = np.atleast_2d(base)
@@ -53,7 +53,7 @@ def tubes(
     radius_start: float | np.ndarray,
     radius_end: float | np.ndarray,
     material: str,
-    tint: Sequence[float],
+    tint: Colour,
     sides: int = 6,
 ) -> Mesh:
     """Tapered tubes from `start` (n,3) to `end` (n,3): poles, trunks, branches, limbs; open at both ends."""
@@ -74,13 +74,13 @@ def tubes(
     return Mesh.of(vertices, _repeat(faces, n, 2 * sides), material, tint)
 
 
-def quads(corners: np.ndarray, material: str, tint: Sequence[float]) -> Mesh:
+def quads(corners: np.ndarray, material: str, tint: Colour) -> Mesh:
     """Quadrilaterals with `corners` (n,4,3) in order around."""
     n = len(corners)
     return Mesh.of(corners.reshape(-1, 3), _repeat(np.array([[0, 1, 2], [0, 2, 3]]), n, 4), material, tint)
 
 
-def loft(rings: np.ndarray, material: str, tint: Sequence[float], closed_ends: bool = True) -> Mesh:
+def loft(rings: np.ndarray, material: str, tint: Colour, closed_ends: bool = True) -> Mesh:
     """A skin over `rings` (S,K,3): car bodies, heads, roofs."""
     stations, around, _ = rings.shape
     i = np.arange(stations - 1)[:, None] * around
@@ -94,7 +94,7 @@ def loft(rings: np.ndarray, material: str, tint: Sequence[float], closed_ends: b
     return Mesh.of(rings.reshape(-1, 3), np.concatenate(faces), material, tint)
 
 
-def ellipsoid(centre: Sequence[float], radii: Sequence[float], material: str, tint: Sequence[float]) -> Mesh:
+def ellipsoid(centre: Sequence[float], radii: Sequence[float], material: str, tint: Colour) -> Mesh:
     """A ball of 5 by 8 facets stretched to `radii`."""
     polar = np.linspace(0.15, np.pi - 0.15, 5)[:, None]
     turn = np.linspace(0, 2 * np.pi, 8, endpoint=False)[None]
@@ -106,7 +106,7 @@ def ellipsoid(centre: Sequence[float], radii: Sequence[float], material: str, ti
 
 
 def cards(
-    centres: np.ndarray, size: np.ndarray, rng: np.random.Generator, material: str, tint: Sequence[float]
+    centres: np.ndarray, size: np.ndarray, rng: np.random.Generator, material: str, tint: Colour
 ) -> Mesh:
     """Small randomly turned triangles at `centres` (n,3), `size` (n,) metres wide: leaves, litter, rubble."""
     n = len(centres)
