@@ -11,7 +11,7 @@ from pathlib import Path
 from hybridreg.data import simulate
 from hybridreg.data.simulate.labelled import pair_id
 
-TIER, SPLIT, SEED, INDEX, VOXEL = "near", "val", 7, 0, 0.2
+TIER, SPLIT, SEED, INDEX, VOXEL = "near", "val", 7, 0, 0.25
 
 
 def main() -> None:
