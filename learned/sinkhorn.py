@@ -1,0 +1,94 @@
+# SPDX-License-Identifier: MIT
+"""Optimal transport with a slack row and column by Sinkhorn's iteration, in two forms (methods 8.3, 8.4)."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import torch
+from torch import Tensor, nn
+
+_MINUS_INFINITY = -1e12
+# Beyond this spread of the scores exp() leaves float32 and the kernel form loses digits.
+_MAX_KERNEL_RANGE = 60.0
+
+
+class OptimalTransport(nn.Module):
+    """Log-assignments of padded patch pairs; the slack score ``alpha`` is learned."""
+
+    def __init__(self, iterations: int) -> None:
+        super().__init__()
+        self.iterations = iterations
+        self.alpha = nn.Parameter(torch.tensor(1.0))
+
+    def forward(
+        self, scores: Tensor, rows: Tensor, columns: Tensor, form: Literal["log", "kernel"] = "log"
+    ) -> Tensor:
+        """Scores (B, n, m) with masks (B, n), (B, m) to log-assignments (B, n + 1, m + 1).
+
+        A perfect match has the value 0. Entries of padded rows and columns are below -1e11. Every pair must
+        have a valid row and a valid column.
+        """
+        if form == "log":
+            return log_sinkhorn(scores, rows, columns, self.alpha, self.iterations)
+        return kernel_sinkhorn(scores, rows, columns, self.alpha, self.iterations)
+
+
+def log_sinkhorn(scores: Tensor, rows: Tensor, columns: Tensor, alpha: Tensor, iterations: int) -> Tensor:
+    """The log-domain iteration: slow, safe for any scores, and what the networks are trained through."""
+    padded = _with_slack(scores, rows, columns, alpha)
+    log_mu, log_nu, norm = _log_marginals(rows, columns, scores.dtype)
+    u, v = torch.zeros_like(log_mu), torch.zeros_like(log_nu)
+    for _ in range(iterations):
+        u = log_mu - torch.logsumexp(padded + v[:, None, :], dim=2)
+        v = log_nu - torch.logsumexp(padded + u[:, :, None], dim=1)
+    return padded + u[:, :, None] + v[:, None, :] - norm[:, None, None]
+
+
+def kernel_sinkhorn(scores: Tensor, rows: Tensor, columns: Tensor, alpha: Tensor, iterations: int) -> Tensor:
+    """The same by products with ``exp(scores)``; falls back to the log form where the scores spread too far."""
+    if len(scores) == 0 or _score_range(scores, rows, columns, alpha) > _MAX_KERNEL_RANGE:
+        return log_sinkhorn(scores, rows, columns, alpha, iterations)
+    padded = _with_slack(scores, rows, columns, alpha)
+    log_mu, log_nu, norm = _log_marginals(rows, columns, scores.dtype)
+    largest = padded.amax((1, 2), keepdim=True)
+    kernel = torch.exp(padded - largest)
+    mu, nu = log_mu.exp()[..., None], log_nu.exp()[..., None]
+    transposed = kernel.transpose(1, 2).contiguous()
+    v = torch.ones_like(nu)
+    u = torch.ones_like(mu)
+    for _ in range(iterations):
+        u = mu / torch.bmm(kernel, v).clamp_min(1e-38)
+        v = nu / torch.bmm(transposed, u).clamp_min(1e-38)
+    log_u = torch.where(log_mu > _MINUS_INFINITY / 2, u[..., 0].clamp_min(1e-38).log(), 0.0)
+    log_v = torch.where(log_nu > _MINUS_INFINITY / 2, v[..., 0].clamp_min(1e-38).log(), 0.0)
+    shift = largest[:, :, 0] + norm[:, None]
+    return padded + log_u[:, :, None] + (log_v - shift)[:, None, :]
+
+
+def _with_slack(scores: Tensor, rows: Tensor, columns: Tensor, alpha: Tensor) -> Tensor:
+    batch, n, m = scores.shape
+    slack_column, slack_row = alpha.expand(batch, n, 1), alpha.expand(batch, 1, m + 1)
+    padded = torch.cat([torch.cat([scores, slack_column], 2), slack_row], 1)
+    invalid = ~(_with_true(rows)[:, :, None] & _with_true(columns)[:, None, :])
+    return padded.masked_fill(invalid, _MINUS_INFINITY)
+
+
+def _log_marginals(rows: Tensor, columns: Tensor, dtype: torch.dtype) -> tuple[Tensor, Tensor, Tensor]:
+    n, m = rows.sum(1).to(dtype), columns.sum(1).to(dtype)
+    norm = -torch.log(n + m)
+    log_mu = torch.cat([norm[:, None].expand(rows.shape), (m.log() + norm)[:, None]], 1)
+    log_nu = torch.cat([norm[:, None].expand(columns.shape), (n.log() + norm)[:, None]], 1)
+    log_mu = log_mu.masked_fill(~_with_true(rows), _MINUS_INFINITY)
+    log_nu = log_nu.masked_fill(~_with_true(columns), _MINUS_INFINITY)
+    return log_mu, log_nu, norm
+
+
+def _with_true(mask: Tensor) -> Tensor:
+    return torch.cat([mask, mask.new_ones(len(mask), 1)], 1)
+
+
+def _score_range(scores: Tensor, rows: Tensor, columns: Tensor, alpha: Tensor) -> float:
+    valid = scores[rows[:, :, None] & columns[:, None, :]]
+    low, high = torch.aminmax(torch.cat([valid, alpha.reshape(1).to(valid.dtype)]))
+    return float(high - low)
