@@ -18,7 +18,7 @@ _CHUNK_VOTES = 2**22
 class LgrEstimate:
     """A pose and how it came about."""
 
-    transform: Tensor  # (4, 4) float64: T_target_source
+    transform: Tensor  # (4, 4): T_target_source
     inliers: Tensor  # (C,) bool: within the acceptance radius of the final pose
     hypotheses: int  # groups that proposed a pose; 0 means that the start was a fit to everything
     rivals: Tensor  # (r, 4, 4): all proposals, most votes first, at most 8
@@ -32,7 +32,8 @@ def local_to_global(
     Parameters
     ----------
     target, source
-        (C, 3) metres, any float type; computed in float64.
+        (C, 3) metres; the computation stays in their float type, so that float32 agrees with the published
+        networks and float64 loses nothing.
     weight
         (C,) confidences.
     group
@@ -49,7 +50,6 @@ def local_to_global(
     counts = {len(target), len(source), len(weight), len(group)}
     if counts == {0} or len(counts) > 1:
         raise ValueError(f"LGR needs arrays of one length above 0, got lengths {sorted(counts)}")
-    target, source, weight = target.double(), source.double(), weight.double()
     proposals = _propose(target, source, weight, group, config.min_group)
     if len(proposals):
         votes = _vote(proposals, target, source, weight, config)
@@ -73,7 +73,7 @@ def _propose(target: Tensor, source: Tensor, weight: Tensor, group: Tensor, min_
     starts = counts.cumsum(0) - counts
     large = (counts >= min_group).nonzero()[:, 0]
     if len(large) == 0:
-        return torch.zeros(0, 4, 4, dtype=torch.float64, device=target.device)
+        return target.new_zeros(0, 4, 4)
     slots = torch.arange(int(counts[large].max()), device=target.device)
     valid = slots[None] < counts[large, None]
     index = order[(starts[large, None] + slots[None]).clamp_max(len(order) - 1)]

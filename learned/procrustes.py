@@ -10,7 +10,7 @@ _EPS = 1e-5
 
 
 def weighted_procrustes(source: Tensor, target: Tensor, weight: Tensor) -> Tensor:
-    """``T_target_source`` (..., 4, 4) float64 that minimises the weighted squared distances.
+    """``T_target_source`` (..., 4, 4) that minimises the weighted squared distances.
 
     Parameters
     ----------
@@ -21,22 +21,22 @@ def weighted_procrustes(source: Tensor, target: Tensor, weight: Tensor) -> Tenso
 
     Notes
     -----
-    Computed on the CPU in float64: 3x3 decompositions are faster there. The weights are divided by their sum
-    plus 1e-5, as the published networks do.
+    Computed on the CPU, where 3x3 decompositions are faster, in the float type of the points. The weights are
+    divided by their sum plus 1e-5, as the published networks do.
     """
     device = source.device
-    source, target, weight = (t.detach().cpu().double() for t in (source, target, weight))
+    source, target, weight = (t.detach().cpu().to(source.dtype) for t in (source, target, weight))
+    identity = torch.eye(4, dtype=source.dtype)
     total = weight.sum(-1, keepdim=True)
     weight = (weight / (total + _EPS))[..., None]  # (..., n, 1)
     centre_source, centre_target = (source * weight).sum(-2, keepdim=True), (target * weight).sum(-2, keepdim=True)
     covariance = (source - centre_source).transpose(-1, -2) @ (weight * (target - centre_target))
     usable = torch.isfinite(covariance).flatten(-2).all(-1) & (total[..., 0] > 1e-8)
-    covariance = torch.where(usable[..., None, None], covariance, torch.eye(3, dtype=torch.float64))
+    covariance = torch.where(usable[..., None, None], covariance, identity[:3, :3])
     rotation = _nearest_rotation(covariance)
     shift = centre_target.transpose(-1, -2) - rotation @ centre_source.transpose(-1, -2)
-    transform = torch.eye(4, dtype=torch.float64).repeat(*covariance.shape[:-2], 1, 1)
+    transform = identity.repeat(*covariance.shape[:-2], 1, 1)
     transform[..., :3, :3], transform[..., :3, 3:] = rotation, shift
-    identity = torch.eye(4, dtype=torch.float64)
     return torch.where(usable[..., None, None], transform, identity).to(device)
 
 

@@ -17,11 +17,14 @@ from hybridreg.learned.lgr import local_to_global
 from hybridreg.learned.losses import overlap_matrix
 from hybridreg.learned.network import Output
 from hybridreg.learned.point_matching import mutual_top_k
+from hybridreg.learned.superpoint_matching import SuperpointMatches, match_superpoints
 from hybridreg.learned.targets import Targets, compute_targets
 
 # The log-assignment of a padded entry is minus infinity up to rounding: about -1e12, where neighbouring float32
 # numbers are 65536 apart. Both sides must be below this; their difference means nothing.
 _PADDED = -1e6
+# Relative: some ten units in the last place of float32.
+_TIE = 5e-6
 
 
 @torch.no_grad()
@@ -31,7 +34,7 @@ def differences(recording: Recording) -> dict[str, float]:
     blocks, output = _forward(recording)
     targets = compute_targets(recording.batch.pyramid, want["in.transform"], recording.config)
     found = {f"out.{name}": _apart(value, want[f"out.{name}"]) for name, value in blocks.items()}
-    found |= _superpoints(output, want)
+    found |= _superpoints(recording, output)
     found |= _targets(targets, want)
     found |= _transport(recording, output)
     found |= _correspondences(recording, output)
@@ -65,10 +68,42 @@ def _apart(value: Tensor, want: Tensor) -> float:
     return float((value.double() - want.double()).abs().max()) if value.numel() else 0.0
 
 
-def _superpoints(output: Output, want: dict[str, Tensor]) -> dict[str, float]:
-    pairs = {"ref": output.superpoints.target, "src": output.superpoints.source}
-    names = {side: f"out.{side}_node_corr_indices" for side in pairs}
-    return {names[side]: 0.0 if torch.equal(pairs[side], want[names[side]]) else math.inf for side in pairs}
+def _superpoints(recording: Recording, output: Output) -> dict[str, float]:
+    """0 where the sequences are equal; else the largest relative gap of the scores that changed places.
+
+    Two float32 computations order scores that agree to their last digits differently: that alone is forgiven.
+    """
+    want, found = recording.values, output.superpoints
+    pairs = torch.stack([want["out.ref_node_corr_indices"], want["out.src_node_corr_indices"]])
+    names = ("out.ref_node_corr_indices", "out.src_node_corr_indices")
+    ours = torch.stack([found.target, found.source])
+    if ours.shape != pairs.shape:
+        return dict.fromkeys(names, math.inf)
+    every = _all_scores(recording, output)
+    gap = (every[pairs[0], pairs[1]] / found.score - 1.0).abs()[(ours != pairs).any(0)]
+    largest = float(gap.max()) if len(gap) else 0.0
+    return dict.fromkeys(names, largest if largest < _TIE else math.inf)
+
+
+def _all_scores(recording: Recording, output: Output) -> Tensor:
+    """(m, n) scores of all pairs; -1 where a superpoint owns no fine points."""
+    clouds, config = output.encoding, recording.config.matching
+    owning = [cloud.patches.occupied.nonzero()[:, 0] for cloud in (clouds.target, clouds.source)]
+    features = [features[index] for features, index in zip(output.node_features, owning, strict=True)]
+    found = match_superpoints(*features, len(owning[0]) * len(owning[1]), dual=config.dual_normalization)
+    scores = torch.full((len(clouds.target.nodes), len(clouds.source.nodes)), -1.0)
+    scores[owning[0][found.target], owning[1][found.source]] = found.score
+    return scores
+
+
+def _recorded_pairs(recording: Recording, output: Output) -> SuperpointMatches:
+    """Ours where they are the recorded set, else the recorded ones: what follows is then judged on its own."""
+    want, found = recording.values, output.superpoints
+    target, source = want["out.ref_node_corr_indices"], want["out.src_node_corr_indices"]
+    same = set(zip(target.tolist(), source.tolist(), strict=True)) == set(
+        zip(found.target.tolist(), found.source.tolist(), strict=True)
+    )
+    return found if same else SuperpointMatches(target, source, torch.ones(len(target)))
 
 
 def _targets(targets: Targets, want: dict[str, Tensor]) -> dict[str, float]:
@@ -92,7 +127,8 @@ def _transport(recording: Recording, output: Output) -> dict[str, float]:
     rows, columns = want["out.ot_row_masks_first4"], want["out.ot_col_masks_first4"]
     scores, expected = want["out.ot_input_first4"], want["out.matching_scores_first4"]
     count = len(scores)
-    pairs = network.pair_up(output.encoding, output.superpoints.target[:count], output.superpoints.source[:count])
+    nodes = want["out.ref_node_corr_indices"][:count], want["out.src_node_corr_indices"][:count]
+    pairs = network.pair_up(output.encoding, *nodes)
     same = torch.equal(pairs.target_mask, rows) and torch.equal(pairs.source_mask, columns)
     own = network.assign(output.encoding, pairs) if same else expected * math.inf
     return {
@@ -113,7 +149,8 @@ def _assignments_apart(value: Tensor, want: Tensor) -> float:
 
 
 def _correspondences(recording: Recording, output: Output) -> dict[str, float]:
-    want, found = recording.values, output.matches
+    want = recording.values
+    found = recording.network.match_points(output.encoding, _recorded_pairs(recording, output))
     pose = local_to_global(found.target, found.source, found.weight, found.group, recording.config.lgr)
     sets = _rows_apart(
         (found.target, found.source, found.weight),
@@ -142,7 +179,8 @@ def _losses(recording: Recording, output: Output, targets: Targets) -> dict[str,
     want, network, config = recording.values, recording.network, recording.config
     clouds = output.encoding
     coarse = circle_loss(*output.node_features, overlap_matrix(targets, output.kept), config.loss)
-    pairs = network.pair_up(clouds, output.superpoints.target, output.superpoints.source)
+    nodes = _recorded_pairs(recording, output)
+    pairs = network.pair_up(clouds, nodes.target, nodes.source)
     fine = assignment_loss(
         network.assign(clouds, pairs),
         pairs,
