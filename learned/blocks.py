@@ -11,8 +11,10 @@ from torch import Tensor, nn
 from torch.nn import functional as F
 
 from hybridreg.learned.kpconv import Influence, KPConv
+from hybridreg.learned.max_pool import max_pool
 
 _SLOPE = 0.1
+_EPS = 1e-5
 
 
 @dataclass(frozen=True)
@@ -43,7 +45,16 @@ class PointGroupNorm(nn.Module):
         return torch.cat([self._normalize(cloud) for cloud in features.split(list(lengths))])
 
     def _normalize(self, features: Tensor) -> Tensor:
-        return F.group_norm(features.t()[None], self.groups, self.weight, self.bias)[0].t()
+        # By channel first, then over the channels of a group: the rows stay where they are, while
+        # torch's group_norm would want them transposed and back.
+        mean = features.mean(0)
+        variance = (features - mean).square().mean(0)
+        grouped = mean.view(self.groups, -1)
+        group_mean = grouped.mean(1, keepdim=True)
+        group_variance = (variance.view(self.groups, -1) + (grouped - group_mean).square()).mean(1, keepdim=True)
+        scale = (group_variance + _EPS).rsqrt().expand_as(grouped).flatten() * self.weight
+        shift = self.bias - group_mean.expand_as(grouped).flatten() * scale
+        return torch.addcmul(shift, features, scale)
 
 
 class Unary(nn.Module):
@@ -58,7 +69,7 @@ class Unary(nn.Module):
     def forward(self, features: Tensor, lengths: tuple[int, int]) -> Tensor:
         """(N, C_in) to (N, C_out)."""
         features = self.norm(self.linear(features), lengths)
-        return F.leaky_relu(features, _SLOPE) if self.activate else features
+        return F.leaky_relu_(features, _SLOPE) if self.activate else features
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -86,7 +97,7 @@ class ConvBlock(nn.Module):
     def forward(self, features: Tensor, around: Surroundings) -> Tensor:
         """(M, C_in) to (N, C_out)."""
         features = self.conv(features, around.queries, around.supports, around.neighbors, around.influence)
-        return F.leaky_relu(self.norm(features, around.lengths), _SLOPE)
+        return F.leaky_relu_(self.norm(features, around.lengths), _SLOPE)
 
 
 class ResidualBlock(nn.Module):
@@ -108,21 +119,16 @@ class ResidualBlock(nn.Module):
         """(M, C_in) to (N, C_out)."""
         main = features if self.unary_in is None else self.unary_in(features, around.support_lengths)
         main = self.conv(main, around.queries, around.supports, around.neighbors, around.influence)
-        main = self.unary_out(F.leaky_relu(self.norm(main, around.lengths), _SLOPE), around.lengths)
+        main = self.unary_out(F.leaky_relu_(self.norm(main, around.lengths), _SLOPE), around.lengths)
         shortcut = max_pool(features, around.neighbors) if self.strided else features
         if self.unary_shortcut is not None:
             shortcut = self.unary_shortcut(shortcut, around.lengths)
-        return F.leaky_relu(main + shortcut, _SLOPE)
-
-
-def max_pool(features: Tensor, neighbors: Tensor) -> Tensor:
-    """Largest feature of each query's neighbours, (M, C) and (N, k) to (N, C); a shadow counts as 0."""
-    return pad_row(features)[neighbors].amax(1)
+        return F.leaky_relu_(main + shortcut, _SLOPE)
 
 
 def upsample(features: Tensor, nearest: Tensor) -> Tensor:
     """Each point takes the features of its coarse point, (M, C) and (N,) to (N, C); a shadow gives 0."""
-    return pad_row(features)[nearest]
+    return F.embedding(nearest, pad_row(features))
 
 
 def pad_row(features: Tensor) -> Tensor:

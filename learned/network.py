@@ -183,8 +183,8 @@ class RegistrationNetwork(nn.Module):
 
     def assign(self, encoding: Encoding, pairs: PatchPairs, form: Literal["log", "kernel"] = "log") -> Tensor:
         """Log-assignments (B, n + 1, m + 1) of patch pairs, the last row and column the slack."""
-        target = pad_row(encoding.target.point_features)[pairs.target_index]
-        source = pad_row(encoding.source.point_features)[pairs.source_index]
+        target = F.embedding(pairs.target_index, pad_row(encoding.target.point_features))
+        source = F.embedding(pairs.source_index, pad_row(encoding.source.point_features))
         dim = target.shape[2]
         scale = dim**0.5 if self.config.matching.score_scale == "sqrt" else float(dim)
         scores = torch.bmm(target, source.transpose(1, 2)) / scale

@@ -9,8 +9,9 @@ import torch
 from torch import Tensor, nn
 
 _MINUS_INFINITY = -1e12
-# Beyond this spread of the scores exp() leaves float32 and the kernel form loses digits.
-_MAX_KERNEL_RANGE = 60.0
+_TINY = 1e-38
+# Potentials that move farther than e^40 from their start leave too little of float32's range.
+_MAX_CHANGE = 40.0
 
 
 class OptimalTransport(nn.Module):
@@ -46,24 +47,25 @@ def log_sinkhorn(scores: Tensor, rows: Tensor, columns: Tensor, alpha: Tensor, i
 
 
 def kernel_sinkhorn(scores: Tensor, rows: Tensor, columns: Tensor, alpha: Tensor, iterations: int) -> Tensor:
-    """The same by products with ``exp(scores)``; falls back to the log form where the scores spread too far."""
-    if len(scores) == 0 or _score_range(scores, rows, columns, alpha) > _MAX_KERNEL_RANGE:
+    """The same by products with ``exp(scores)``, for a tenth of the time.
+
+    The first iteration is done on logarithms and its potentials go into the kernel, which is then of the order of
+    the marginals whatever the scores: only their change has to fit float32. Where it does not, the log form runs.
+    """
+    if len(scores) == 0 or iterations < 2:
         return log_sinkhorn(scores, rows, columns, alpha, iterations)
-    padded = _with_slack(scores, rows, columns, alpha)
-    log_mu, log_nu, norm = _log_marginals(rows, columns, scores.dtype)
-    largest = padded.amax((1, 2), keepdim=True)
-    kernel = torch.exp(padded - largest)
-    mu, nu = log_mu.exp()[..., None], log_nu.exp()[..., None]
-    transposed = kernel.transpose(1, 2).contiguous()
-    v = torch.ones_like(nu)
-    u = torch.ones_like(mu)
-    for _ in range(iterations):
-        u = mu / torch.bmm(kernel, v).clamp_min(1e-38)
-        v = nu / torch.bmm(transposed, u).clamp_min(1e-38)
-    log_u = torch.where(log_mu > _MINUS_INFINITY / 2, u[..., 0].clamp_min(1e-38).log(), 0.0)
-    log_v = torch.where(log_nu > _MINUS_INFINITY / 2, v[..., 0].clamp_min(1e-38).log(), 0.0)
-    shift = largest[:, :, 0] + norm[:, None]
-    return padded + log_u[:, :, None] + (log_v - shift)[:, None, :]
+    start = log_sinkhorn(scores, rows, columns, alpha, 1)
+    mu, nu = (marginal.exp()[..., None] for marginal in _log_marginals(rows, columns, scores.dtype)[:2])
+    kernel = torch.exp(start) / (rows.sum(1) + columns.sum(1))[:, None, None]
+    u, v = torch.ones_like(mu), torch.ones_like(nu)
+    for _ in range(iterations - 1):
+        u = mu / torch.bmm(kernel, v).clamp_min(_TINY)
+        v = nu / torch.bmm(kernel.transpose(1, 2), u).clamp_min(_TINY)
+    log_u = torch.where(mu > 0, u, 1.0).log()
+    log_v = torch.where(nu > 0, v, 1.0).log()
+    if max(float(log_u.abs().max()), float(log_v.abs().max())) > _MAX_CHANGE:
+        return log_sinkhorn(scores, rows, columns, alpha, iterations)
+    return start + log_u + log_v.transpose(1, 2)
 
 
 def _with_slack(scores: Tensor, rows: Tensor, columns: Tensor, alpha: Tensor) -> Tensor:
@@ -86,9 +88,3 @@ def _log_marginals(rows: Tensor, columns: Tensor, dtype: torch.dtype) -> tuple[T
 
 def _with_true(mask: Tensor) -> Tensor:
     return torch.cat([mask, mask.new_ones(len(mask), 1)], 1)
-
-
-def _score_range(scores: Tensor, rows: Tensor, columns: Tensor, alpha: Tensor) -> float:
-    valid = scores[rows[:, :, None] & columns[:, None, :]]
-    low, high = torch.aminmax(torch.cat([valid, alpha.reshape(1).to(valid.dtype)]))
-    return float(high - low)

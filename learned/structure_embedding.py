@@ -7,9 +7,10 @@ import math
 
 import torch
 from torch import Tensor, nn
+from torch.nn import functional as F
 
 from hybridreg.learned.distances import squared_distances
-from hybridreg.learned.positions import frequencies, sinusoids
+from hybridreg.learned.positions import frequencies
 
 # Values of the (rows, n, k, d) angle tensor computed in one go: 16 MB, whatever the number of superpoints.
 _CHUNK_VALUES = 2**22
@@ -41,11 +42,18 @@ class StructureEmbedding(nn.Module):
         return torch.cat([self._rows(points, distance[block], nearest[block], block) for block in blocks])
 
     def _rows(self, points: Tensor, distance: Tensor, nearest: Tensor, block: Tensor) -> Tensor:
-        embedding = self.distance(sinusoids(distance / self.sigma_d, self.frequency))  # (b, n, d)
+        embedding = self._embed(self.distance, distance / self.sigma_d)  # (b, n, d)
         if nearest.shape[1] == 0:  # a single superpoint spans no angle
             return embedding
         angles = neighbor_angles(points[block], points, points[nearest]) * self.angle_scale  # (b, n, k)
-        return embedding + self.angle(sinusoids(angles, self.frequency)).amax(2)
+        return embedding.add_(self._embed(self.angle, angles).amax(2))
+
+    def _embed(self, layer: nn.Linear, values: Tensor) -> Tensor:
+        # The layer's columns are sorted to take all sines, then all cosines, instead of interleaving the values.
+        half = len(self.frequency)
+        weight = layer.weight.view(-1, half, 2).transpose(1, 2).reshape(-1, 2 * half)
+        omega = values[..., None] * self.frequency
+        return F.linear(torch.cat([omega.sin(), omega.cos()], dim=-1), weight, layer.bias)
 
 
 def neighbor_angles(anchors: Tensor, points: Tensor, nearest: Tensor) -> Tensor:
