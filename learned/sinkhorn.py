@@ -50,22 +50,25 @@ def kernel_sinkhorn(scores: Tensor, rows: Tensor, columns: Tensor, alpha: Tensor
     """The same by products with ``exp(scores)``, for a tenth of the time.
 
     The first iteration is done on logarithms and its potentials go into the kernel, which is then of the order of
-    the marginals whatever the scores: only their change has to fit float32. Where it does not, the log form runs.
+    the marginals whatever the scores: only their change has to fit float32. The pairs for which it does not are done again in the log form.
     """
     if len(scores) == 0 or iterations < 2:
         return log_sinkhorn(scores, rows, columns, alpha, iterations)
     start = log_sinkhorn(scores, rows, columns, alpha, 1)
-    mu, nu = (marginal.exp()[..., None] for marginal in _log_marginals(rows, columns, scores.dtype)[:2])
+    mu, nu = (marginal.exp()[:, None] for marginal in _log_marginals(rows, columns, scores.dtype)[:2])
     kernel = torch.exp(start) / (rows.sum(1) + columns.sum(1))[:, None, None]
-    u, v = torch.ones_like(mu), torch.ones_like(nu)
+    # A row times a matrix is five times as fast as a matrix times a column: hence a transposed copy.
+    transposed = kernel.transpose(1, 2).contiguous()
+    u, v = torch.ones_like(mu), torch.ones_like(nu)  # (B, 1, n + 1), (B, 1, m + 1)
     for _ in range(iterations - 1):
-        u = mu / torch.bmm(kernel, v).clamp_min(_TINY)
-        v = nu / torch.bmm(kernel.transpose(1, 2), u).clamp_min(_TINY)
-    log_u = torch.where(mu > 0, u, 1.0).log()
-    log_v = torch.where(nu > 0, v, 1.0).log()
-    if max(float(log_u.abs().max()), float(log_v.abs().max())) > _MAX_CHANGE:
-        return log_sinkhorn(scores, rows, columns, alpha, iterations)
-    return start + log_u + log_v.transpose(1, 2)
+        u = mu / torch.bmm(v, transposed).clamp_min(_TINY)
+        v = nu / torch.bmm(u, kernel).clamp_min(_TINY)
+    log_u, log_v = torch.where(mu > 0, u, 1.0).log(), torch.where(nu > 0, v, 1.0).log()
+    out = start + log_u.transpose(1, 2) + log_v
+    lost = torch.maximum(log_u.abs().amax((1, 2)), log_v.abs().amax((1, 2))) > _MAX_CHANGE
+    if bool(lost.any()):
+        out[lost] = log_sinkhorn(scores[lost], rows[lost], columns[lost], alpha, iterations)
+    return out
 
 
 def _with_slack(scores: Tensor, rows: Tensor, columns: Tensor, alpha: Tensor) -> Tensor:
