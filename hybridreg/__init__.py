@@ -1,9 +1,77 @@
 # SPDX-License-Identifier: MIT
-"""Registration of point clouds from different sensors: every stage a slot, classical or learned."""
+"""Registration of point clouds from different sensors: every stage a slot, classical or learned.
 
+>>> import hybridreg as hr
+>>> result = hr.register("fan.ply", "rings.ply", image="front.png")
+>>> result.verdict, result.transformation
+"""
+
+from importlib import import_module as _import_module
 from pathlib import Path as _Path
+from typing import TYPE_CHECKING
+from typing import Any as _Any
 
 # In a checkout `classical/`, `learned/` and `eval/` lie beside this package; a wheel carries them inside it.
 _root = _Path(__file__).resolve().parent.parent
 if (_root / "pyproject.toml").is_file() and (_root / "classical").is_dir():
     __path__.append(str(_root))
+
+if TYPE_CHECKING:
+    from hybridreg.api import register
+    from hybridreg.classical.fgr import Fgr
+    from hybridreg.classical.fpfh import Fpfh
+    from hybridreg.classical.gicp import Gicp
+    from hybridreg.classical.icp import Icp
+    from hybridreg.classical.kiss import KissMatcher
+    from hybridreg.classical.kiss_icp import KissIcp
+    from hybridreg.classical.nothing import GivenMatches, Identity, NoMatch, NoOverlap, NoRefinement
+    from hybridreg.classical.ransac import Ransac
+    from hybridreg.classical.sampling import AllPoints, RandomSample
+    from hybridreg.classical.svd import WeightedSvd
+    from hybridreg.classical.visibility import Visibility
+    from hybridreg.classical.voxel import VoxelGrid
+    from hybridreg.cloud import PointCloud
+    from hybridreg.matches import Correspondences, Overlap, Pose
+    from hybridreg.pair import LabelledPair, Pair
+    from hybridreg.pipeline import Pipeline, Trace
+    from hybridreg.result import RegistrationResult
+    from hybridreg.scene import Level, Scene
+    from hybridreg.stage import Stage
+
+_WHERE = {
+    "hybridreg.api": ["register"],
+    "hybridreg.classical.fgr": ["Fgr"],
+    "hybridreg.classical.fpfh": ["Fpfh"],
+    "hybridreg.classical.gicp": ["Gicp"],
+    "hybridreg.classical.icp": ["Icp"],
+    "hybridreg.classical.kiss": ["KissMatcher"],
+    "hybridreg.classical.kiss_icp": ["KissIcp"],
+    "hybridreg.classical.nothing": ["GivenMatches", "Identity", "NoMatch", "NoOverlap", "NoRefinement"],
+    "hybridreg.classical.ransac": ["Ransac"],
+    "hybridreg.classical.sampling": ["AllPoints", "RandomSample"],
+    "hybridreg.classical.svd": ["WeightedSvd"],
+    "hybridreg.classical.visibility": ["Visibility"],
+    "hybridreg.classical.voxel": ["VoxelGrid"],
+    "hybridreg.cloud": ["PointCloud"],
+    "hybridreg.matches": ["Correspondences", "Overlap", "Pose"],
+    "hybridreg.pair": ["LabelledPair", "Pair"],
+    "hybridreg.pipeline": ["Pipeline", "Trace"],
+    "hybridreg.result": ["RegistrationResult"],
+    "hybridreg.scene": ["Level", "Scene"],
+    "hybridreg.stage": ["Stage"],
+}
+_MODULE_OF = {name: module for module, names in _WHERE.items() for name in names}
+
+__version__ = "0.1.0"
+__all__ = sorted([*_MODULE_OF, "__version__"])
+
+
+def __getattr__(name: str) -> _Any:
+    # Names are imported when they are asked for, so that `import hybridreg` costs next to nothing.
+    if name not in _MODULE_OF:
+        raise AttributeError(f"module 'hybridreg' has no attribute {name!r}")
+    return getattr(_import_module(_MODULE_OF[name]), name)
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

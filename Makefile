@@ -1,0 +1,37 @@
+# One virtual environment beside the sources; CI pins torch through constraints.txt, users need not.
+PYTHON ?= python3
+CONSTRAINTS ?= constraints.txt
+BIN := .venv/bin
+DATA ?= ../shared/data/real
+
+.PHONY: install demo test lint types bench clean
+
+install: .venv/installed
+
+.venv/installed: pyproject.toml constraints.txt
+	$(PYTHON) -m venv .venv
+	$(BIN)/python -m pip install --quiet --upgrade pip
+	$(BIN)/python -m pip install --quiet --constraint $(CONSTRAINTS) --editable ".[test,dev]"
+	touch $@
+
+demo: install
+	$(BIN)/python -m hybridreg demo --out out/demo
+
+test: install
+	OMP_NUM_THREADS=2 $(BIN)/python -m pytest -q
+
+lint: install
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+
+# Against the installed wheel, as a user's type checker sees it.
+types: install
+	rm -rf build/types && $(PYTHON) -m venv build/types
+	build/types/bin/python -m pip install --quiet --no-deps .
+	cd build && ../$(BIN)/mypy --config-file ../pyproject.toml --python-executable ../$(BIN)/python -p hybridreg
+
+bench: install
+	$(BIN)/python -m benchmarks --data $(DATA)
+
+clean:
+	rm -rf .venv build out

@@ -1,0 +1,2 @@
+# SPDX-License-Identifier: MIT
+"""Ratios against peers, each measured in one run."""

@@ -1,0 +1,163 @@
+# SPDX-License-Identifier: MIT
+"""Presets beside the plain wheels, on the same pairs in one run.
+
+The peers are called as their own documentation shows, with none of this library's code between: KISS-Matcher then
+small_gicp at 0.3 and 0.5 m, and Open3D's FPFH + RANSAC then small_gicp at 0.5 m.
+
+    python -m benchmarks.peers --data ../shared/data/real --starts 3
+"""
+
+from __future__ import annotations
+
+import argparse
+import dataclasses
+import json
+import time
+import zlib
+from collections.abc import Callable, Iterable, Iterator
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+import hybridreg as hr
+from hybridreg import se3
+from hybridreg._open3d import load_open3d
+from hybridreg.data import open_dataset, yaw_starts
+from hybridreg.pair import LabelledPair
+
+Array = NDArray[np.float64]
+Method = Callable[[LabelledPair], Array]
+
+
+def kiss_then_gicp(voxel: float) -> Method:
+    """KISS-Matcher with its defaults at one voxel size, refined by small_gicp with its defaults."""
+
+    def run(labelled: LabelledPair) -> Array:
+        import kiss_matcher
+        import small_gicp
+
+        source, target = labelled.pair.source.points, labelled.pair.target.points
+        matcher = kiss_matcher.KISSMatcher(kiss_matcher.KISSMatcherConfig(voxel))
+        solution = matcher.estimate(source.astype(np.float32), target.astype(np.float32))
+        T = se3.from_rt(np.asarray(solution.rotation), np.ravel(solution.translation))
+        return np.asarray(small_gicp.align(target, source, T, num_threads=2).T_target_source)
+
+    return run
+
+
+def open3d_then_gicp(voxel: float) -> Method:
+    """Open3D's global registration example, refined by small_gicp with its defaults."""
+
+    def run(labelled: LabelledPair) -> Array:
+        import small_gicp
+
+        o3d = load_open3d()
+        reg = o3d.pipelines.registration
+        clouds, features = [], []
+        for cloud in (labelled.pair.source, labelled.pair.target):
+            down = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(cloud.points)).voxel_down_sample(voxel)
+            down.estimate_normals(o3d.geometry.KDTreeSearchParamHybrid(2 * voxel, 30))
+            clouds.append(down)
+            features.append(reg.compute_fpfh_feature(down, o3d.geometry.KDTreeSearchParamHybrid(5 * voxel, 100)))
+        o3d.utility.random.seed(zlib.crc32(labelled.pair.id.encode()) % 2**31)
+        found = reg.registration_ransac_based_on_feature_matching(
+            *clouds,
+            *features,
+            mutual_filter=True,
+            max_correspondence_distance=1.5 * voxel,
+            estimation_method=reg.TransformationEstimationPointToPoint(False),
+            ransac_n=3,
+            checkers=[
+                reg.CorrespondenceCheckerBasedOnEdgeLength(0.9),
+                reg.CorrespondenceCheckerBasedOnDistance(1.5 * voxel),
+            ],
+            criteria=reg.RANSACConvergenceCriteria(100_000, 0.999),
+        )
+        init = np.asarray(found.transformation)
+        source, target = labelled.pair.source.points, labelled.pair.target.points
+        return np.asarray(small_gicp.align(target, source, init, num_threads=2).T_target_source)
+
+    return run
+
+
+def preset(name: str) -> Method:
+    """One of this library's presets; its verdict is part of the time."""
+    pipeline = hr.Pipeline.preset(name)
+    return lambda labelled: pipeline.run(labelled.pair).transformation
+
+
+PEERS: dict[str, Callable[[], Method]] = {
+    "kiss-matcher 0.3 + small_gicp": lambda: kiss_then_gicp(0.3),
+    "kiss-matcher 0.5 + small_gicp": lambda: kiss_then_gicp(0.5),
+    "open3d fpfh-ransac 0.5 + small_gicp": lambda: open3d_then_gicp(0.5),
+}
+
+
+@dataclasses.dataclass(frozen=True)
+class Outcome:
+    """One method on one pair."""
+
+    method: str
+    pair: str
+    rre_deg: float
+    rte_m: float
+    seconds: float
+
+    @property
+    def success(self) -> bool:
+        return self.rre_deg < 2.0 and self.rte_m < 0.5
+
+
+def race(pairs: Iterable[LabelledPair], methods: dict[str, Method]) -> Iterator[Outcome]:
+    """Run every method on a pair before the next pair, so that a slow minute of the machine hits all alike."""
+    for labelled in pairs:
+        for name, method in methods.items():
+            start = time.perf_counter()
+            T = method(labelled)
+            seconds = time.perf_counter() - start
+            truth = labelled.T_target_source
+            yield Outcome(
+                name,
+                labelled.pair.id,
+                se3.angle_deg(truth[:3, :3].T @ T[:3, :3]),
+                float(np.linalg.norm(T[:3, 3] - truth[:3, 3])),
+                seconds,
+            )
+
+
+def summary(outcomes: list[Outcome], against: str) -> str:
+    """Markdown table: recall at 2 deg and 0.5 m, median seconds, time ratio to the peer `against`."""
+    methods = list(dict.fromkeys(o.method for o in outcomes))
+    seconds = {m: np.array([o.seconds for o in outcomes if o.method == m]) for m in methods}
+    lines = [f"| method | recall | solved | median s | time / {against} |", "|---|---|---|---|---|"]
+    for m in methods:
+        solved = [o.success for o in outcomes if o.method == m]
+        ratio = np.median(seconds[m] / seconds[against])
+        lines.append(
+            f"| {m} | {np.mean(solved):.3f} | {sum(solved)}/{len(solved)} | {np.median(seconds[m]):.2f} | {ratio:.2f} |"
+        )
+    return "\n".join(lines)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--data", default="../shared/data/real")
+    parser.add_argument("--starts", type=int, default=3, help="random yaw starts beside the pair as it is")
+    parser.add_argument("--presets", nargs="*", default=["kiss-gicp", "fpfh-ransac-gicp"])
+    parser.add_argument("--rows", type=Path, help="write one JSON line for each method and pair")
+    options = parser.parse_args()
+    methods = {name: make() for name, make in PEERS.items()} | {name: preset(name) for name in options.presets}
+    outcomes = []
+    for outcome in race(yaw_starts(open_dataset(options.data), options.starts), methods):
+        outcomes.append(outcome)
+        print(f"{outcome.pair:40s} {outcome.method:38s} {outcome.rre_deg:7.2f} {outcome.rte_m:7.2f} "
+              f"{'ok' if outcome.success else '--'} {outcome.seconds:.2f} s", flush=True)  # fmt: skip
+    print(f"\n{len(outcomes) // len(methods)} starts of the pairs in {options.data}; success is 2 deg and 0.5 m\n")
+    print(summary(outcomes, "kiss-matcher 0.5 + small_gicp"))
+    if options.rows:
+        options.rows.write_text("".join(json.dumps(dataclasses.asdict(o)) + "\n" for o in outcomes))
+
+
+if __name__ == "__main__":
+    main()

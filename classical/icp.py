@@ -1,0 +1,86 @@
+# SPDX-License-Identifier: MIT
+"""Iterative closest point, point to point (Besl and McKay 1992) and point to plane (Chen and Medioni 1992)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hybridreg import se3
+from hybridreg.matches import Pose
+from hybridreg.normals import surface, tree
+from hybridreg.scene import Scene
+from hybridreg.stage import Stage
+
+Array = NDArray[np.float64]
+
+_FEWEST = 6
+_STILL_RAD, _STILL_M = 1e-6, 1e-5
+
+
+@dataclass(frozen=True, kw_only=True)
+class Icp(Stage):
+    """Move the source onto its nearest target points until it rests.
+
+    Parameters
+    ----------
+    kind : "point" or "plane"
+        What is minimised: the distance to the nearest point, or to the plane through it.
+    max_distances : tuple of float or None
+        Farthest partner in each round, metres; None takes 5, 2.5 and 1.25 spacings of the levels.
+    iterations : int
+        At most, in each round.
+    """
+
+    kind: Literal["point", "plane"] = "point"
+    max_distances: tuple[float, ...] | None = None
+    iterations: int = 50
+
+    def __post_init__(self) -> None:
+        if self.kind not in ("point", "plane"):
+            raise ValueError(f"kind={self.kind!r} must be 'point' or 'plane'")
+
+    def __call__(self, scene: Scene, pose: Pose) -> Pose:
+        T = pose.T
+        for distance in self.max_distances or (5 * scene.spacing, 2.5 * scene.spacing, 1.25 * scene.spacing):
+            for _ in range(self.iterations):
+                twist = self._step(scene, T, distance)
+                if twist is None:
+                    break
+                T = se3.exp(twist) @ T
+                if np.abs(twist[:3]).max() < _STILL_RAD and np.abs(twist[3:]).max() < _STILL_M:
+                    break
+        return Pose(T, pose.inliers, pose.rivals)
+
+    def _step(self, scene: Scene, T: Array, max_distance: float) -> Array | None:
+        moved = se3.apply(T, scene.source.points)
+        distance, index = tree(scene, "target").query(moved, distance_upper_bound=max_distance, workers=-1)
+        hit = np.isfinite(distance)
+        if hit.sum() < _FEWEST:
+            return None
+        p, q = moved[hit], scene.target.points[index[hit]]
+        if self.kind == "plane":
+            return plane_step(p, q, surface(scene, "target").normals[index[hit]])
+        return point_step(p, q)
+
+
+def plane_step(p: Array, q: Array, normals: Array) -> Array:
+    """Gauss-Newton step (6,) on the distances of `p` (N, 3) to the planes at `q` with `normals`.
+
+    Rotation vector in radians about the origin, then translation; directions that the planes leave open stay put.
+    """
+    J = np.hstack([np.cross(p, normals), normals])
+    residual = np.sum((p - q) * normals, axis=1)
+    # Least squares with a cut-off, so that an unconstrained direction gets no step at all.
+    return np.linalg.lstsq(J.T @ J, -J.T @ residual, rcond=1e-9)[0]
+
+
+def point_step(p: Array, q: Array) -> Array:
+    """Rigid motion that maps `p` (N, 3) onto `q` with least squares, as a twist (6,)."""
+    p_mean, q_mean = p.mean(axis=0), q.mean(axis=0)
+    # Rotation that maximises trace(R H): the nearest rotation to the transposed cross-covariance.
+    R = se3.project((q - q_mean).T @ (p - p_mean))
+    return np.concatenate([se3.log_rotation(R), q_mean - R @ p_mean])

@@ -1,0 +1,116 @@
+# SPDX-License-Identifier: MIT
+"""Voxel grid: one point per occupied cell, the centroid of its members."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hybridreg.pair import Pair
+from hybridreg.resolution import default_voxel
+from hybridreg.scene import Level, Scene
+from hybridreg.stage import Stage
+
+Array = NDArray[np.float64]
+
+# A table of one byte a cell is faster than sorting as long as it stays within this many bytes.
+_TABLE = 1 << 26
+_MOST_CELLS = 2**62
+
+
+@dataclass(frozen=True, kw_only=True)
+class VoxelGrid(Stage):
+    """Downsample both clouds to the centroids of a grid's cells.
+
+    Parameters
+    ----------
+    voxel : float or None
+        Edge of a cell, metres. None derives one length for both clouds from how far they reach
+        (`hybridreg.resolution.default_voxel`) and notes it in the result.
+    density : "keep" or "match"
+        "match" gives each cloud the voxel at which both have about as many points per occupied volume; for a
+        sparse sensor against a dense one.
+    """
+
+    voxel: float | None = None
+    density: Literal["keep", "match"] = "keep"
+
+    def __post_init__(self) -> None:
+        if self.voxel is not None and not 0.0 < self.voxel < np.inf:
+            raise ValueError(f"voxel={self.voxel} must be a positive length in metres")
+        if self.density not in ("keep", "match"):
+            raise ValueError(f"density={self.density!r} must be 'keep' or 'match'")
+
+    def __call__(self, pair: Pair) -> Scene:
+        voxel = self.voxel or default_voxel(pair.source.points, pair.target.points)
+        clouds = (pair.source, pair.target)
+        points = [voxel_centroids(cloud.points, voxel) for cloud in clouds]
+        spacing = [voxel, voxel]
+        if self.density == "match":
+            dense = int(np.argmax([len(p) for p in points]))
+            points[dense], spacing[dense] = _thin(clouds[dense].points, voxel, len(points[1 - dense]))
+        source, target = (
+            Level(points=p, spacing=s, viewpoint=c.viewpoint) for p, s, c in zip(points, spacing, clouds, strict=True)
+        )
+        scene = Scene(pair=pair, source=source, target=target)
+        if self.voxel is None:
+            scene.note(f"voxel {voxel:.3g} m, derived from the clouds' reach")
+        return scene
+
+
+def voxel_centroids(points: Array, voxel: float) -> Array:
+    """Centroids (n, 3) of the occupied cells of a grid, ordered by cell.
+
+    Parameters
+    ----------
+    points : (N, 3)
+    voxel : float
+        Edge of a cell, metres.
+
+    Raises
+    ------
+    ValueError
+        If the grid has more cells than an index can tell apart.
+    """
+    columns = np.ascontiguousarray(points.T)  # (3, N): numpy reduces along rows ten times faster
+    key, n_cells = _cell_of(columns, voxel)
+    if n_cells <= _TABLE:
+        occupied = np.zeros(n_cells, dtype=bool)
+        occupied[key] = True
+        cells = np.flatnonzero(occupied)
+        rank = np.empty(n_cells, dtype=np.int32)
+        rank[cells] = np.arange(len(cells), dtype=np.int32)
+        member, n = rank[key], len(cells)
+    else:
+        cells, member = np.unique(key, return_inverse=True)
+        n = len(cells)
+    count = np.bincount(member, minlength=n)
+    sums = [np.bincount(member, weights=column, minlength=n) for column in columns]
+    return np.column_stack(sums) / count[:, None]
+
+
+def _cell_of(columns: Array, voxel: float) -> tuple[NDArray[np.int64], int]:
+    # The origin lies a hair below the smallest coordinate: data rounded to millimetres would otherwise sit on
+    # cell borders, where the last digit of a float decides.
+    origin = columns.min(axis=1) - 1e-5 * voxel
+    shape = np.floor((columns.max(axis=1) - origin) / voxel) + 1.0
+    if float(np.prod(shape)) > _MOST_CELLS:
+        raise ValueError(
+            f"a voxel of {voxel:.3g} m cuts the cloud into {' x '.join(f'{s:.3g}' for s in shape)} cells; "
+            "choose a larger voxel or check the unit"
+        )
+    x, y, z = ((columns - origin[:, None]) / voxel).astype(np.int64)
+    nx, ny, nz = (int(s) for s in shape)
+    return x + nx * (y + ny * z), nx * ny * nz
+
+
+def _thin(points: Array, voxel: float, n_wanted: int) -> tuple[Array, float]:
+    # Bisection on the voxel: the count falls monotonically enough for twelve halvings to meet it within a percent.
+    low, high = voxel, 16.0 * voxel
+    for _ in range(12):
+        middle = np.sqrt(low * high)
+        low, high = (middle, high) if len(voxel_centroids(points, middle)) > n_wanted else (low, middle)
+    return voxel_centroids(points, high), float(high)

@@ -1,0 +1,44 @@
+# SPDX-License-Identifier: MIT
+"""How sure a mean over few pairs is."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+N_RESAMPLES = 2000
+# Above this many groups the draws are made in parts, to bound memory.
+_CELLS = 20_000_000
+
+
+def interval(
+    values: Array, groups: Sequence[str], *, seed: int = 0, level: float = 0.95
+) -> tuple[float, float]:
+    """Percentile bootstrap interval of the mean of `values` (n,).
+
+    Whole groups are drawn, because a pair and its turned copies share a scene: drawn one by one they would make
+    the interval too narrow. Values that are not finite are left out.
+    """
+    keep = np.isfinite(values)
+    if not keep.any():
+        return float("nan"), float("nan")
+    names, member = np.unique(np.asarray(groups)[keep], return_inverse=True)
+    sums = np.bincount(member, weights=values[keep], minlength=len(names))
+    counts = np.bincount(member, minlength=len(names))
+    rng = np.random.default_rng(seed)
+    part = max(1, _CELLS // len(names))
+    means = np.concatenate(
+        [_means(sums, counts, min(part, N_RESAMPLES - done), rng) for done in range(0, N_RESAMPLES, part)]
+    )
+    low, high = np.quantile(means, [0.5 - level / 2, 0.5 + level / 2])
+    return float(low), float(high)
+
+
+def _means(sums: Array, counts: NDArray[np.int64], n: int, rng: np.random.Generator) -> Array:
+    draw = rng.integers(len(sums), size=(n, len(sums)))
+    means: Array = sums[draw].sum(axis=1) / counts[draw].sum(axis=1)
+    return means

@@ -1,0 +1,94 @@
+# SPDX-License-Identifier: MIT
+"""Tables as Markdown, LaTeX and CSV."""
+
+from __future__ import annotations
+
+import csv
+import dataclasses
+import io
+from collections.abc import Sequence
+
+from hybridreg.eval import columns
+from hybridreg.eval.columns import Cells
+from hybridreg.eval.protocols import Protocol
+from hybridreg.eval.table import Table
+
+_LATEX = {"\\": r"\textbackslash{}", "°": r"$^\circ$", "–": "--"} | {c: f"\\{c}" for c in "&%$#_{}"}
+_LATEX |= {"<": "$<$", ">": "$>$", "~": r"\textasciitilde{}", "^": r"\textasciicircum{}"}
+
+
+def markdown(table: Table, protocols: Sequence[Protocol]) -> str:
+    """Every protocol's tables with their captions, then what the numbers hang on."""
+    parts = [f"# {table.title}"]
+    for protocol in protocols:
+        parts.append(f"## {protocol.name}\n\n{table.caption(protocol)} ({protocol.source}).")
+        parts.extend(markdown_table(lines) for lines in tables(table, protocol).values() if lines)
+    parts.extend(f"Not run: {name}. {problem}" for name, problem in table.problems.items())
+    parts.append(
+        "Recall's interval is a bootstrap over scenes (a pair and its turned copies are drawn together). "
+        "A pair without a pose counts as the identity and never as a success. Seconds are wall time with one "
+        f"thread a pair; seed {table.seed}."
+    )
+    return "\n\n".join(parts) + "\n"
+
+
+def tables(table: Table, protocol: Protocol) -> dict[str, list[Cells]]:
+    """All tables of one protocol by their headings."""
+    scores = table.scores(protocol)
+    with_verdict = [e for e in table.methods if any(row.verdict for row in e.rows)]
+    return {
+        "Results": [columns.results(name, score) for name, score in scores.items()],
+        "Recall at fixed thresholds": [columns.thresholds(name, score) for name, score in scores.items()],
+        "Recall by overlap": [columns.by_overlap(e.name, e.rows, protocol) for e in table.entries],
+        "Verdict against success": [columns.verdicts(e.name, e.rows, protocol) for e in with_verdict],
+        "Seconds of each stage": columns.stages(scores),
+    }
+
+
+def markdown_table(lines: Sequence[Cells]) -> str:
+    """Lines of the same columns as a Markdown table."""
+    head = list(lines[0])
+    rows = [head, ["---"] * len(head), *([line[key] for key in head] for line in lines)]
+    return "\n".join(f"| {' | '.join(cell.replace('|', chr(92) + '|') for cell in row)} |" for row in rows)
+
+
+def latex(table: Table, protocols: Sequence[Protocol]) -> str:
+    """The main table of every protocol, for the package booktabs."""
+    return "\n".join(_latex_table(table, protocol) for protocol in protocols)
+
+
+def _latex_table(table: Table, protocol: Protocol) -> str:
+    lines = tables(table, protocol)["Results"]
+    head = list(lines[0])
+    body = "\n".join(f"{' & '.join(_escape(line[key]) for key in head)} \\\\" for line in lines)
+    return (
+        "\\begin{table}\n\\centering\n"
+        f"\\caption{{{_escape(table.caption(protocol))}.}}\n"
+        f"\\begin{{tabular}}{{l{'r' * (len(head) - 1)}}}\n\\toprule\n"
+        f"{' & '.join(_escape(key) for key in head)} \\\\\n\\midrule\n{body}\n"
+        "\\bottomrule\n\\end{tabular}\n\\end{table}\n"
+    )
+
+
+def _escape(text: str) -> str:
+    return "".join(_LATEX.get(character, character) for character in text)
+
+
+def table_csv(table: Table, protocols: Sequence[Protocol]) -> str:
+    """One line a method and protocol, numbers in full."""
+    lines = []
+    for protocol in protocols:
+        for name, score in table.scores(protocol).items():
+            fields = dataclasses.asdict(score) | {"protocol": protocol.name}
+            at, seconds = fields.pop("recall_at"), fields.pop("seconds")
+            lines.append(
+                {"method": name, "data": table.data, **fields}
+                | {f"recall at {key}": value for key, value in at.items()}
+                | {f"seconds {stage}": value for stage, value in seconds.items()}
+            )
+    text = io.StringIO()
+    head = list(dict.fromkeys(key for line in lines for key in line))
+    writer = csv.DictWriter(text, head, restval="", lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(lines)
+    return text.getvalue()

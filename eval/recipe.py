@@ -1,0 +1,157 @@
+# SPDX-License-Identifier: MIT
+"""A table as a TOML file: the data, the protocols, a base pipeline, and what each line changes in it."""
+
+from __future__ import annotations
+
+import itertools
+import os
+import re
+import sys
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+from hybridreg import changes
+from hybridreg.eval.attempt import Method
+from hybridreg.eval.protocols import Protocol, protocol
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
+
+_KEYS = {"title", "data", "protocols", "seed", "starts", "base", "row", "sweep"}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Line:
+    """One line of a table: a method, or why the stages asked for do not fit together."""
+
+    name: str
+    method: Method | None
+    problem: str = ""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Recipe:
+    """What a table file says.
+
+    Attributes
+    ----------
+    starts : how often each pair is repeated with its source under a random yaw
+    """
+
+    title: str
+    data: str = ""
+    protocols: tuple[Protocol, ...]
+    seed: int = 0
+    starts: int = 0
+    lines: tuple[Line, ...]
+
+
+def known() -> list[str]:
+    """Names of the tables that come with the library."""
+    return sorted(f.name[:-5] for f in _shipped().iterdir() if f.name.endswith(".toml"))
+
+
+def read(path: str | os.PathLike[str]) -> Recipe:
+    """Read a table file, or one that comes with the library by its name.
+
+    Raises
+    ------
+    FileNotFoundError
+        No such file.
+    KeyError, ValueError
+        Not TOML, a key that means nothing, a name that nobody registered, two lines of one name.
+    """
+    shipped = os.fspath(path) in known() and not Path(path).exists()
+    file = _shipped().joinpath(f"{os.fspath(path)}.toml") if shipped else Path(path)
+    try:
+        table = tomllib.loads(file.read_text(encoding="utf-8"))
+    except (UnicodeDecodeError, tomllib.TOMLDecodeError, IsADirectoryError) as error:
+        raise ValueError(f"{os.fspath(path)}: not a TOML file ({error})") from error
+    try:
+        return parse(table, title=Path(path).stem)
+    except ValueError as error:
+        raise ValueError(f"{os.fspath(path)}: {error}") from error
+
+
+def parse(table: Mapping[str, Any], *, title: str = "table") -> Recipe:
+    """Recipe of a table file's content."""
+    unknown = set(table) - _KEYS
+    if unknown:
+        raise ValueError(f"{', '.join(sorted(unknown))}: unknown; a table has {', '.join(sorted(_KEYS))}")
+    base = table.get("base", {})
+    lines = [*_rows(base, table.get("row", [])), *_grid(base, table.get("sweep", {}))]
+    if not lines:
+        raise ValueError("the table has no [[row]] and no [sweep]")
+    names = [slug(line.name) for line in lines]
+    double = next((line.name for line in lines if names.count(slug(line.name)) > 1), None)
+    if double is not None:
+        raise ValueError(f"two lines are called {double!r}; give each a name of its own")
+    return Recipe(
+        title=table.get("title", title),
+        data=table.get("data", ""),
+        protocols=tuple(protocol(name) for name in table.get("protocols", ["cross3dreg", "kitti"])),
+        seed=table.get("seed", 0),
+        starts=table.get("starts", 0),
+        lines=tuple(lines),
+    )
+
+
+def slug(name: str) -> str:
+    """A name as a file may be called."""
+    return re.sub(r"[^a-z0-9.]+", "-", name.lower()).strip("-.") or "row"
+
+
+def title_of(changed: Mapping[str, Any]) -> str:
+    """Name of a line that has none of its own: what it changes."""
+    parts = []
+    for key, value in changed.items():
+        if isinstance(value, Mapping):
+            stage = [str(value["stage"])] if "stage" in value else []
+            text = " ".join(stage + [f"{k}={v}" for k, v in value.items() if k != "stage"])
+        else:
+            text = str(value)
+        parts.append(text if key == "preset" else f"{key} {text}")
+    return ", ".join(parts) or "base"
+
+
+def _shipped() -> Any:
+    return files("hybridreg.eval").joinpath("tables")
+
+
+def _rows(base: Mapping[str, Any], rows: list[dict[str, Any]]) -> Iterator[Line]:
+    for row in rows:
+        changed = {key: value for key, value in row.items() if key != "name"}
+        yield Line(
+            name=row.get("name") or title_of(changed), method=changes.build(changes.merge(base, changed))
+        )
+
+
+def _grid(base: Mapping[str, Any], sweep: Mapping[str, Any]) -> Iterator[Line]:
+    # Every combination of the axes; one that does not fit stays in the table, with the reason.
+    axes = dict(_axes(sweep))
+    if not axes:
+        return
+    for values in itertools.product(*axes.values()):
+        changed: dict[str, Any] = {}
+        for key, value in zip(axes, values, strict=True):
+            slot, _, field = key.partition(".")
+            changed = changes.merge(changed, {slot: {field: value} if field else value})
+        try:
+            yield Line(name=title_of(changed), method=changes.build(changes.merge(base, changed)))
+        except ValueError as error:
+            yield Line(name=title_of(changed), method=None, problem=str(error))
+
+
+def _axes(sweep: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, list[Any]]]:
+    for key, value in sweep.items():
+        if isinstance(value, Mapping):
+            yield from _axes(value, f"{prefix}{key}.")
+        elif isinstance(value, list) and value:
+            yield prefix + key, value
+        else:
+            raise ValueError(f"sweep {prefix}{key}: expected a list of values, got {value!r}")

@@ -1,0 +1,2 @@
+# SPDX-License-Identifier: MIT
+"""Tables that come with the library."""

@@ -1,0 +1,54 @@
+# SPDX-License-Identifier: MIT
+"""Two clouds in, one pose out."""
+
+from __future__ import annotations
+
+from typing import Any, Literal
+
+from hybridreg.pair import Pair
+from hybridreg.pipeline import Pipeline
+from hybridreg.presets import DEFAULT
+from hybridreg.result import RegistrationResult
+
+
+def register(
+    source: Any,
+    target: Any,
+    image: Any = None,
+    *,
+    preset: str = DEFAULT,
+    voxel: float | None = None,
+    seed: int = 0,
+    nonfinite: Literal["raise", "drop"] = "raise",
+) -> RegistrationResult:
+    """Align two point clouds with the default recipe, or with a preset of another name.
+
+    Parameters
+    ----------
+    source, target : path, (N, 3+) array, torch tensor, Open3D cloud or PointCloud, in any mix
+        Metres. The source moves, the target stays.
+    image : path, (H, W[, C]) array or None
+        A photograph of the common view; no calibration. Stages that know no image ignore it.
+    voxel : float or None
+        Metres; None derives it from how far the clouds reach.
+    seed : int
+        Fixes every random choice.
+    nonfinite : "raise" or "drop"
+        What to do with points that are not finite; the count dropped stands in the result's notes.
+
+    Returns
+    -------
+    RegistrationResult
+        Read `verdict` and `reasons` before `transformation`.
+
+    Raises
+    ------
+    ValueError
+        For input that no pose can be computed from, naming the cloud, the number and the cure.
+    FileNotFoundError
+        For a path that does not exist.
+    KeyError
+        For a preset that does not exist.
+    """
+    pipeline = Pipeline.preset(preset, voxel=voxel)
+    return pipeline.run(Pair.of(source, target, image, nonfinite=nonfinite), seed=seed)

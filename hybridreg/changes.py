@@ -1,0 +1,99 @@
+# SPDX-License-Identifier: MIT
+"""What changes in a pipeline, written down: a line of a table file, or `--set` on the command line."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+from hybridreg import presets
+from hybridreg.pipeline import Pipeline
+from hybridreg.slots import SLOTS
+from hybridreg.spec import to_table
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
+
+KEYS = ("preset", "pipeline", "voxel", *SLOTS)
+
+
+def build(changes: Mapping[str, Any]) -> Pipeline:
+    """Pipeline of a preset (or a pipeline's file) and what differs from it.
+
+    Parameters
+    ----------
+    changes : mapping
+        `preset` a name or `pipeline` a TOML file, `voxel` metres, and for each slot a stage's name, a table with
+        `stage` for another stage, or a table without it for other fields of the stage that is there.
+
+    Raises
+    ------
+    KeyError, ValueError
+        A name, key or field that does not exist; stages that do not fit together.
+    """
+    unknown = set(changes) - set(KEYS)
+    if unknown:
+        raise ValueError(f"{', '.join(sorted(unknown))}: unknown; a pipeline is told by {', '.join(KEYS)}")
+    if "preset" in changes and "pipeline" in changes:
+        raise ValueError(
+            f"preset={changes['preset']!r} and pipeline={changes['pipeline']!r}: leave one of them out"
+        )
+    if "pipeline" in changes:
+        start = Pipeline.load(changes["pipeline"])
+    else:
+        start = Pipeline.preset(changes.get("preset", presets.DEFAULT))
+    return apply(start, {key: value for key, value in changes.items() if key in SLOTS or key == "voxel"})
+
+
+def apply(pipeline: Pipeline, changes: Mapping[str, Any]) -> Pipeline:
+    """The pipeline with some slots filled anew, or some fields of a slot's stage changed."""
+    slots: dict[str, Any] = {}
+    for slot, change in changes.items():
+        if isinstance(change, Mapping) and "stage" not in change:
+            slots[slot] = {**to_table(getattr(pipeline, slot), slot), **change}
+        else:
+            slots[slot] = change
+    return pipeline.swap(**slots)
+
+
+def merge(base: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
+    """`base` overlaid by `changes`; the fields of one stage are joined, another stage replaces the old one."""
+    merged = dict(base)
+    for key, change in changes.items():
+        before = merged.get(key)
+        if isinstance(change, Mapping) and "stage" not in change and before is not None:
+            before = {"stage": before} if isinstance(before, str) else before
+            merged[key] = {**before, **change}
+        else:
+            merged[key] = change
+    return merged
+
+
+def parse(settings: Iterable[str]) -> dict[str, Any]:
+    """Changes from texts like `match=fpfh`, `match.radius=1.25`, `voxel=0.3`.
+
+    Raises
+    ------
+    ValueError
+        A text without `=`, or deeper than `slot.field`.
+    """
+    changes: dict[str, Any] = {}
+    for text in settings:
+        key, equals, value = text.partition("=")
+        slot, dot, field = key.strip().partition(".")
+        if not equals or not slot or (dot and not field) or "." in field:
+            raise ValueError(
+                f"--set {text}: expected slot=name or slot.field=value, such as match.radius=1.25"
+            )
+        changes = merge(changes, {slot: {field: _value(value)} if dot else _value(value)})
+    return changes
+
+
+def _value(text: str) -> Any:
+    try:
+        return tomllib.loads(f"value = {text}")["value"]
+    except tomllib.TOMLDecodeError:
+        return text.strip()

@@ -1,0 +1,23 @@
+# SPDX-License-Identifier: MIT
+"""The commands, gathered."""
+
+from __future__ import annotations
+
+import typer
+
+from hybridreg.cli import demo, doctor, evaluate, listing, register, report, table
+
+app = typer.Typer(
+    name="hybridreg",
+    help="Register point clouds from different sensors, and score pipelines that do.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+)
+app.command("register")(register.command)
+app.command("eval")(evaluate.command)
+app.command("table")(table.command)
+app.command("report")(report.command)
+app.command("list")(listing.command)
+app.command("doctor")(doctor.command)
+app.command("demo")(demo.command)

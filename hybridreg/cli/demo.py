@@ -1,0 +1,42 @@
+# SPDX-License-Identifier: MIT
+"""`hybridreg demo`: the main job on a pair that comes with the library."""
+
+from __future__ import annotations
+
+from importlib.resources import as_file, files
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from hybridreg.cli import options
+from hybridreg.cli.faults import VERDICT_FAILED, plainly
+from hybridreg.cli.register import show
+
+
+@plainly
+def command(
+    out: Annotated[Path, typer.Option(help="Folder for pose, result, page and picture.")] = Path("out/demo"),
+    preset: options.Preset = None,
+    seed: options.Seed = 0,
+) -> None:
+    """Align the embedded pair of clouds and compare with its true pose."""
+    from hybridreg.changes import build
+    from hybridreg.data.folder import load_pair
+    from hybridreg.eval import metrics, single
+
+    method = build(options.changes_of(preset, None, None, None))
+    with as_file(files("hybridreg.data").joinpath("demo")) as folder:
+        labelled = load_pair(folder)
+    pair = labelled.pair
+    kinds = f"{pair.meta.get('source_sensor', 'source')} -> {pair.meta.get('target_sensor', 'target')}"
+    print(f"{kinds}: {len(pair.source)} and {len(pair.target)} points")
+    result = method.run(pair, seed=seed)
+    show(result)
+    rre = metrics.rre_deg(result.transformation, labelled.T_target_source)
+    rte = metrics.rte_m(result.transformation, labelled.T_target_source)
+    print(f"against the true pose: {rre:.2f} deg, {rte:.2f} m")
+    written = single.write(pair, result, out)
+    print(f"written to {out}: {', '.join(file.name for file in written)}")
+    if result.verdict == "failed":
+        raise typer.Exit(VERDICT_FAILED)

@@ -1,0 +1,83 @@
+# SPDX-License-Identifier: MIT
+"""`hybridreg doctor`: what is installed, what loads, and what to do about what does not."""
+
+from __future__ import annotations
+
+import importlib
+import platform
+from collections.abc import Iterator
+from importlib.metadata import PackageNotFoundError, version
+
+from hybridreg.cli.faults import plainly, sentence
+
+# Module to distribution; what each is needed for.
+_NEEDED = {
+    "numpy": ("numpy", "everything"),
+    "scipy": ("scipy", "everything"),
+    "sklearn": ("scikit-learn", "FPFH matching"),
+    "cv2": ("opencv-python-headless", "images"),
+    "open3d": ("open3d", "FPFH, FGR, Open3D's RANSAC"),
+    "small_gicp": ("small_gicp", "GICP"),
+    "kiss_matcher": ("kiss-matcher", "estimate=kiss"),
+    "kiss_icp": ("kiss-icp", "refine=kiss-icp"),
+    "torch": ("torch", "learned stages"),
+    "joblib": ("joblib", "tables"),
+    "plotly": ("plotly", "HTML reports"),
+    "matplotlib": ("matplotlib", "pictures"),
+    "laspy": ("laspy", "las and laz files (extra `las`)"),
+    "distributed": ("distributed", "tables on a cluster (extra `cluster`)"),
+}
+
+
+@plainly
+def command() -> None:
+    """Tell versions, which libraries load, and whether there is a GPU."""
+    import hybridreg
+
+    print(f"hybridreg {hybridreg.__version__}, Python {platform.python_version()}, {platform.platform()}")
+    for module, (distribution, purpose) in _NEEDED.items():
+        print(f"  {distribution} {_installed(distribution)}: {_loads(module)} (for {purpose})")
+    print(f"GPU: {_gpu()}")
+    for line in _unloadable_stages():
+        print(line)
+
+
+def _installed(distribution: str) -> str:
+    try:
+        return version(distribution)
+    except PackageNotFoundError:
+        return "not installed"
+
+
+def _loads(module: str) -> str:
+    try:
+        if module == "open3d":
+            from hybridreg._open3d import load_open3d
+
+            load_open3d()
+        else:
+            importlib.import_module(module)
+    except Exception as error:  # whatever a library raises when it cannot load, the others are still told
+        return f"does not load: {sentence(error)}"
+    return "loads"
+
+
+def _gpu() -> str:
+    try:
+        import torch
+    except Exception as error:  # as above
+        return f"unknown without torch ({sentence(error)})"
+    if not torch.cuda.is_available():
+        return "none that torch can use; learned stages run on the CPU"
+    return ", ".join(torch.cuda.get_device_name(i) for i in range(torch.cuda.device_count()))
+
+
+def _unloadable_stages() -> Iterator[str]:
+    from hybridreg import registry
+
+    for key in registry.known():
+        slot, _, name = key.partition(".")
+        try:
+            registry.load(slot, name)
+        except Exception as error:  # a broken plug-in must not hide the rest
+            yield f"stage {key} does not load: {sentence(error)}"

@@ -1,0 +1,51 @@
+# SPDX-License-Identifier: MIT
+"""`hybridreg list`: what can be named."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from enum import Enum
+from typing import Annotated
+
+import typer
+
+from hybridreg.cli.faults import plainly
+
+
+class Kind(str, Enum):
+    """What to list."""
+
+    stages = "stages"
+    presets = "presets"
+    datasets = "datasets"
+    tables = "tables"
+    protocols = "protocols"
+
+
+@plainly
+def command(kind: Annotated[Kind | None, typer.Argument(help="All kinds if not given.")] = None) -> None:
+    """List stages, presets, data sets, tables and protocols."""
+    for each in Kind if kind is None else [kind]:
+        print(f"{each.value}:")
+        for line in lines(each):
+            print(f"  {line}")
+
+
+def lines(kind: Kind) -> Iterator[str]:
+    """The names of one kind, each with what it stands for."""
+    from hybridreg import presets, registry
+    from hybridreg.data import catalogue
+    from hybridreg.eval import protocols, recipe
+    from hybridreg.slots import SLOTS
+
+    if kind is Kind.stages:
+        yield from (f"{slot}: {', '.join(registry.names(slot))}" for slot in SLOTS)
+    elif kind is Kind.presets:
+        yield from (f"{n} (default)" if n == presets.DEFAULT else n for n in presets.names())
+    elif kind is Kind.datasets:
+        yield "a folder of pairs, by its path"
+        yield from (f"{name}:..." for name in catalogue.names())
+    elif kind is Kind.tables:
+        yield from recipe.known()
+    else:
+        yield from (each.describe().removeprefix("protocol ") for each in protocols.PROTOCOLS.values())

@@ -1,0 +1,33 @@
+# SPDX-License-Identifier: MIT
+"""Options that several commands share."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+Preset = Annotated[str | None, typer.Option(help="Pipeline by name; `hybridreg list presets` tells them.")]
+PipelineFile = Annotated[Path | None, typer.Option(help="Pipeline as a TOML file, instead of a preset.")]
+Settings = Annotated[
+    list[str] | None,
+    typer.Option("--set", metavar="slot=name", help="Another stage, or slot.field=value; repeatable."),
+]
+Voxel = Annotated[float | None, typer.Option(help="Voxel, metres; derived from the clouds if not given.")]
+Seed = Annotated[int, typer.Option(help="Fixes every random choice.")]
+Protocols = Annotated[
+    list[str] | None, typer.Option("--protocol", help="Rule of scoring by name; repeatable.")
+]
+Workers = Annotated[int, typer.Option(min=1, help="Processes, each with one thread.")]
+Overwrite = Annotated[bool, typer.Option("--overwrite", help="Run anew what the folder already holds.")]
+
+
+def changes_of(
+    preset: str | None, pipeline: Path | None, settings: list[str] | None, voxel: float | None
+) -> dict[str, Any]:
+    """The options that choose a pipeline, as `hybridreg.changes.build` takes them."""
+    from hybridreg.changes import merge, parse
+
+    given = {"preset": preset, "pipeline": pipeline, "voxel": voxel}
+    return merge({key: value for key, value in given.items() if value is not None}, parse(settings or []))

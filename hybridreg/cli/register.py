@@ -1,0 +1,67 @@
+# SPDX-License-Identifier: MIT
+"""`hybridreg register A B`: align two clouds."""
+
+from __future__ import annotations
+
+from enum import Enum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from hybridreg.cli import options
+from hybridreg.cli.faults import VERDICT_FAILED, plainly
+
+if TYPE_CHECKING:
+    from hybridreg.result import RegistrationResult
+
+
+class NonFinite(str, Enum):
+    """What to do with points that are not finite."""
+
+    refuse = "raise"
+    drop = "drop"
+
+
+@plainly
+def command(
+    source: Annotated[Path, typer.Argument(help="The cloud that moves: ply, pcd, npy, npz, bin, las, txt.")],
+    target: Annotated[Path, typer.Argument(help="The cloud that stays.")],
+    image: Annotated[Path | None, typer.Option(help="A photograph of the common view.")] = None,
+    preset: options.Preset = None,
+    pipeline: options.PipelineFile = None,
+    settings: options.Settings = None,
+    voxel: options.Voxel = None,
+    seed: options.Seed = 0,
+    out: Annotated[Path | None, typer.Option(help="Folder for pose, result, page and picture.")] = None,
+    nonfinite: Annotated[NonFinite, typer.Option(help="Points that are not finite.")] = NonFinite.refuse,
+) -> None:
+    """Align two point clouds; print the pose, whether to believe it, and the seconds of each stage."""
+    from hybridreg.changes import build
+    from hybridreg.pair import Pair
+
+    method = build(options.changes_of(preset, pipeline, settings, voxel))
+    pair = Pair.of(source, target, image, nonfinite="drop" if nonfinite is NonFinite.drop else "raise")
+    result = method.run(pair, seed=seed)
+    show(result)
+    if out is not None:
+        from hybridreg.eval import single
+
+        files = single.write(pair, result, out)
+        print(f"written to {out}: {', '.join(file.name for file in files)}")
+    if result.verdict == "failed":
+        raise typer.Exit(VERDICT_FAILED)
+
+
+def show(result: RegistrationResult) -> None:
+    """Print a result."""
+    print("T_target_source, metres:")
+    for row in result.transformation:
+        print("  " + " ".join(f"{value:14.9f}" for value in row))
+    print(f"verdict: {result.verdict} (confidence {result.confidence:.2f})")
+    for reason in result.reasons:
+        print(f"  - {reason}")
+    for note in result.notes:
+        print(f"note: {note}")
+    stages = ", ".join(f"{stage} {seconds:.3f}" for stage, seconds in result.seconds.items())
+    print(f"seconds: {stages}; together {sum(result.seconds.values()):.3f}")

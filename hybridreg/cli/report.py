@@ -1,0 +1,51 @@
+# SPDX-License-Identifier: MIT
+"""`hybridreg report`: score stored predictions again, without running anything."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from hybridreg.cli import options
+from hybridreg.cli.faults import plainly
+
+if TYPE_CHECKING:
+    from hybridreg.eval.table import Table
+    from hybridreg.pair import LabelledPair
+
+
+@plainly
+def command(
+    paths: Annotated[list[Path], typer.Argument(help="A table's folder, or files of predictions.")],
+    protocols: options.Protocols = None,
+    data: Annotated[str | None, typer.Option(help="Where the data lies now, for the 3D views.")] = None,
+    out: Annotated[Path | None, typer.Option(help="Folder; the table's own if not given.")] = None,
+) -> None:
+    """Write the reports of a table anew, under any protocol."""
+    from hybridreg.cli import running
+    from hybridreg.eval import table
+    from hybridreg.eval.protocols import protocol
+
+    folder = paths[0] if len(paths) == 1 and paths[0].is_dir() else None
+    if folder is not None:
+        done, names = table.load(folder), table.read_index(folder)["protocols"]
+    else:
+        done, names = table.of_files(paths), ["cross3dreg", "kitti"]
+    chosen = [protocol(name) for name in protocols or names]
+    running.write(done, chosen, out or folder or Path("runs/report"), _data(done, data))
+
+
+def _data(done: Table, data: str | None) -> Sequence[LabelledPair] | None:
+    # The views are an extra: data that has gone must not keep anyone from scoring. Asked for by name, it must open.
+    from hybridreg.cli.running import with_starts
+    from hybridreg.data import open_dataset
+
+    try:
+        return with_starts(open_dataset(data or done.data), done.starts, done.seed)
+    except (OSError, ValueError):
+        if data is not None:
+            raise
+        return None

@@ -1,0 +1,39 @@
+# SPDX-License-Identifier: MIT
+"""`hybridreg table`: several pipelines side by side, as a TOML file tells."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from hybridreg.cli import options
+from hybridreg.cli.faults import plainly
+
+
+@plainly
+def command(
+    file: Annotated[str, typer.Argument(help="TOML file, or the name of one: `hybridreg list tables`.")],
+    data: Annotated[
+        str | None, typer.Option(help="Folder of pairs, or name:rest; overrides the file.")
+    ] = None,
+    protocols: options.Protocols = None,
+    workers: options.Workers = 1,
+    out: Annotated[Path | None, typer.Option(help="Folder; runs/<file's name> if not given.")] = None,
+    overwrite: options.Overwrite = False,
+) -> None:
+    """Run a table, print it, and write it as Markdown, LaTeX, CSV and one HTML page."""
+    from hybridreg.cli import running
+    from hybridreg.eval import recipe
+    from hybridreg.eval.protocols import protocol
+
+    read = recipe.read(file)
+    if protocols:
+        read = dataclasses.replace(read, protocols=tuple(protocol(name) for name in protocols))
+    where = data or read.data
+    if not where:
+        raise ValueError(f"{file} names no data; give --data, a folder of pairs or name:rest of a loader")
+    folder = out or Path("runs") / Path(file).stem
+    running.run(read, where, folder, workers=workers, overwrite=overwrite)

@@ -1,0 +1,72 @@
+# SPDX-License-Identifier: MIT
+"""What a data set is: a sequence of labelled pairs whose names are known before any of them is read."""
+
+from __future__ import annotations
+
+import zlib
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from typing import overload
+
+from hybridreg.pair import LabelledPair
+
+
+class Dataset(Sequence[LabelledPair], ABC):
+    """A sequence of pairs that reads each of them when it is asked for.
+
+    Any sequence of `LabelledPair` can be evaluated; this class adds names without reading, which makes resuming
+    quick, and a fingerprint, by which a changed data set is noticed.
+    """
+
+    @property
+    @abstractmethod
+    def ids(self) -> tuple[str, ...]:
+        """Names of the pairs, each once."""
+
+    @abstractmethod
+    def load(self, index: int) -> LabelledPair:
+        """Read pair number `index`, 0 to len - 1."""
+
+    def fingerprint(self) -> str:
+        """Changes when the pairs or their truths do."""
+        return f"{zlib.crc32(repr(self.ids).encode()):08x}"
+
+    def __len__(self) -> int:
+        return len(self.ids)
+
+    @overload
+    def __getitem__(self, index: int) -> LabelledPair: ...
+
+    @overload
+    def __getitem__(self, index: slice) -> list[LabelledPair]: ...
+
+    def __getitem__(self, index: int | slice) -> LabelledPair | list[LabelledPair]:
+        if isinstance(index, slice):
+            return [self.load(i) for i in range(*index.indices(len(self)))]
+        if not -len(self) <= index < len(self):
+            raise IndexError(f"pair {index} of a data set of {len(self)}")
+        return self.load(index % len(self))
+
+
+def ids_of(pairs: Sequence[LabelledPair]) -> tuple[str, ...]:
+    """Names of the pairs of any sequence; one that does not tell them is read through.
+
+    Raises
+    ------
+    ValueError
+        Two pairs of one name, which a resumed run could not tell apart.
+    """
+    known = getattr(pairs, "ids", None)
+    ids = tuple(known) if known is not None else tuple(labelled.pair.id for labelled in pairs)
+    if len(set(ids)) < len(ids):
+        double = next(i for i in ids if ids.count(i) > 1)
+        raise ValueError(
+            f"the data set has {ids.count(double)} pairs called {double!r}; give each its own id"
+        )
+    return ids
+
+
+def fingerprint_of(pairs: Sequence[LabelledPair]) -> str:
+    """Fingerprint of any sequence: its own where it has one, else that of the names."""
+    own = getattr(pairs, "fingerprint", None)
+    return str(own()) if callable(own) else f"{zlib.crc32(repr(ids_of(pairs)).encode()):08x}"

@@ -1,0 +1,110 @@
+# SPDX-License-Identifier: MIT
+"""A folder of pairs as a data set: one folder each, `source.*`, `target.*`, perhaps `image.*`, and `meta.json`."""
+
+from __future__ import annotations
+
+import json
+import os
+import zlib
+from pathlib import Path
+from typing import Any
+
+from hybridreg import se3
+from hybridreg.data.dataset import Dataset
+from hybridreg.pair import LabelledPair, Pair
+
+# Only these reach the pair: calibrations and checks in a meta.json may hold the pose, or let one compute it.
+_FREE_FACTS = ("kind", "source_sensor", "target_sensor", "licence")
+
+
+class PairFolder(Dataset):
+    """Pairs that lie in the sub-folders of `root`; sub-folders without a source and a `meta.json` are passed over.
+
+    Parameters
+    ----------
+    root : path
+        `root/<id>/source.*` and `target.*` are clouds of any format that `hybridreg.io` reads, `image.*` is a
+        photograph, and `meta.json` holds `T_target_source`, 4x4, row by row, metres.
+
+    Raises
+    ------
+    FileNotFoundError
+        Saying what is missing and where it must lie.
+    ValueError
+        Two files where one is expected.
+    """
+
+    def __init__(self, root: str | os.PathLike[str]) -> None:
+        folder = Path(root)
+        if not folder.is_dir():
+            raise FileNotFoundError(
+                f"{folder}: there is no such folder; it must hold one folder for each pair"
+            )
+        self.root = folder
+        self._ids = tuple(sorted(f.name for f in folder.iterdir() if _is_pair(f)))
+        if not self.ids:
+            raise FileNotFoundError(
+                f"{folder}: no pairs; each must be a folder {folder.name}/<id>/ with source.*, target.* and meta.json"
+            )
+        for name in self.ids:
+            _files(folder / name)
+
+    @property
+    def ids(self) -> tuple[str, ...]:
+        return self._ids
+
+    def load(self, index: int) -> LabelledPair:
+        return load_pair(self.root / self.ids[index])
+
+    def fingerprint(self) -> str:
+        digest = 0
+        for name in self.ids:
+            files = _files(self.root / name)
+            sizes = {kind: file.stat().st_size for kind, file in files.items()}
+            digest = zlib.crc32(
+                repr((name, sorted(sizes.items()))).encode() + files["meta"].read_bytes(), digest
+            )
+        return f"{digest:08x}"
+
+
+def load_pair(folder: Path) -> LabelledPair:
+    """Read the pair of one folder; its name is the pair's id."""
+    files = _files(folder)
+    meta = _read_meta(files["meta"])
+    facts = {key: meta[key] for key in _FREE_FACTS if key in meta}
+    pair = Pair.of(files["source"], files["target"], files.get("image"), id=folder.name, meta=facts)
+    truth = se3.check(meta["T_target_source"], f"{files['meta']}: T_target_source")
+    return LabelledPair(pair=pair, T_target_source=truth, overlap=meta.get("overlap"))
+
+
+def _is_pair(folder: Path) -> bool:
+    return folder.is_dir() and ((folder / "meta.json").is_file() or any(folder.glob("source.*")))
+
+
+def _files(folder: Path) -> dict[str, Path]:
+    found = {}
+    for kind in ("source", "target", "image"):
+        candidates = sorted(folder.glob(f"{kind}.*"))
+        if len(candidates) > 1:
+            raise ValueError(f"{folder}: {len(candidates)} files are called {kind}.*; leave one of them")
+        if candidates:
+            found[kind] = candidates[0]
+    if (folder / "meta.json").is_file():
+        found["meta"] = folder / "meta.json"
+    names = {"source": "source.*", "target": "target.*", "meta": "meta.json with T_target_source"}
+    missing = [text for kind, text in names.items() if kind not in found]
+    if missing:
+        raise FileNotFoundError(f"{folder}: {' and '.join(missing)} missing; it must lie in that folder")
+    return found
+
+
+def _read_meta(path: Path) -> dict[str, Any]:
+    try:
+        meta = json.loads(path.read_text(encoding="utf-8"))
+    except ValueError as error:
+        raise ValueError(f"{path}: not a JSON file ({error})") from error
+    if not isinstance(meta, dict) or "T_target_source" not in meta:
+        raise ValueError(
+            f"{path}: T_target_source is missing; it must be the 4x4 pose that maps source to target"
+        )
+    return meta

@@ -1,0 +1,119 @@
+# SPDX-License-Identifier: MIT
+"""Do the stages of a pipeline fit together, and does the pair fit them?"""
+
+from __future__ import annotations
+
+import dataclasses
+import warnings
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from hybridreg import gate, registry
+from hybridreg.pair import Pair
+from hybridreg.scene import Scene
+from hybridreg.slots import SLOTS
+
+if TYPE_CHECKING:
+    from hybridreg.pipeline import Pipeline
+
+# No LiDAR reaches this far, and no sensor pair shares a scene this small, in metres.
+_FARTHEST, _SMALLEST = 2_000.0, 0.05
+# Cells along one axis beyond which the voxel or the unit is wrong: 1 cm cells over 1 km.
+_MANY_CELLS = 100_000
+# Below this the grid has merged what there was to match.
+_FEW_LEFT = 200
+
+
+def with_voxel(downsample: Any, voxel: float | None) -> Any:
+    """The downsampling stage with `Pipeline(voxel=...)` put into it."""
+    if voxel is None:
+        return downsample
+    if not hasattr(downsample, "voxel"):
+        raise ValueError(f"voxel={voxel} was given, but {type(downsample).__name__} has no voxel; leave one of them out")
+    if downsample.voxel not in (None, voxel):
+        raise ValueError(f"voxel={voxel} contradicts the downsampling stage's own voxel={downsample.voxel}")
+    return dataclasses.replace(downsample, voxel=voxel)
+
+
+def check(pipeline: Pipeline) -> None:
+    """Refuse stages that do not fit.
+
+    Raises
+    ------
+    ValueError
+        Naming the slot, what is missing, and stages that would fit.
+    """
+    for slot in SLOTS:
+        if not callable(getattr(pipeline, slot)):
+            raise ValueError(f"{slot}: {getattr(pipeline, slot)!r} is no stage; it must be callable")
+    given = _words(pipeline.match, "gives")
+    lacking = _words(pipeline.estimate, "needs") - given - {"image"}
+    if not lacking:
+        return
+    word = sorted(lacking)[0]
+    raise ValueError(
+        f"{_label(pipeline.estimate)} needs {word!r} from the match stage, and {_label(pipeline.match)} does not give "
+        f"it. Matchers that do: {_or(registry.slot_fits('match', gives=word))}. Estimators that work with "
+        f"{_label(pipeline.match)}: {_or(registry.slot_fits('estimate', needs=given))}"
+    )
+
+
+def check_image(pipeline: Pipeline, pair: Pair) -> None:
+    """Refuse a pair without an image where a stage cannot do without."""
+    if pair.image is not None:
+        return
+    for slot in SLOTS:
+        if "image" in _words(getattr(pipeline, slot), "needs"):
+            raise ValueError(f"pair {pair.id}: {_label(getattr(pipeline, slot))} needs an image; pass image=...")
+
+
+def check_scene(scene: Scene) -> None:
+    """Refuse levels that are too small to register; warn of a unit or a voxel that is evidently wrong."""
+    for name, cloud, level in (
+        ("source", scene.pair.source, scene.source),
+        ("target", scene.pair.target, scene.target),
+    ):
+        if len(level) < gate.MIN_POINTS:
+            raise ValueError(
+                f"{name}: {len(level)} of {len(cloud)} points are left after downsampling to {level.spacing:.3g} m, "
+                f"fewer than {gate.MIN_POINTS}; choose a smaller voxel"
+            )
+        extent = np.ptp(cloud.points, axis=0)
+        axis = int(np.argmax(extent))
+        cells = extent[axis] / level.spacing
+        if cells > _MANY_CELLS:
+            _warn(
+                f"{name}: {cells:.3g} voxels of {level.spacing:.3g} m along {'xyz'[axis]}; "
+                "are the coordinates in metres?"
+            )
+        elif len(level) < min(_FEW_LEFT, 0.5 * len(cloud)):
+            _warn(
+                f"{name}: only {len(level)} of {len(cloud)} points are left after downsampling to "
+                f"{level.spacing:.3g} m; a smaller voxel or another unit may be meant"
+            )
+        # The inner half of the points, so that one stray return does not decide.
+        reach = float(np.median(np.linalg.norm(cloud.points - np.median(cloud.points, axis=0), axis=1)))
+        if reach > _FARTHEST or reach < _SMALLEST:
+            unit = "millimetres" if reach > _FARTHEST else "kilometres or a normalised unit"
+            _warn(
+                f"{name}: half of the points lie {'beyond' if reach > _FARTHEST else 'within'} {reach:.3g} m of the "
+                f"cloud's middle; lengths here are metres, are yours {unit}?"
+            )
+
+
+def _warn(text: str) -> None:
+    warnings.warn(text, UserWarning, stacklevel=5)
+
+
+def _words(stage: Any, attribute: str) -> frozenset[str]:
+    return frozenset(getattr(stage, attribute, ()))
+
+
+def _label(stage: Any) -> str:
+    registered = registry.name_of(stage)
+    return f'{type(stage).__name__} ("{registered}")' if registered else type(stage).__name__
+
+
+def _or(names: list[str]) -> str:
+    return ", ".join(names) if names else "none that is installed"

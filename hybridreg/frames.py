@@ -1,0 +1,67 @@
+# SPDX-License-Identifier: MIT
+"""From the coordinates that the user gave to the small ones that the stages see, and back."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hybridreg.matches import Correspondences
+from hybridreg.pair import Pair
+
+Array = NDArray[np.float64]
+
+
+def raise_pose(T: Array, pair: Pair) -> Array:
+    """Pose between the user's coordinates, of a pose between the clouds with their offsets taken off."""
+    raised = T.copy()
+    raised[:3, 3] = T[:3, 3] + pair.target.offset - T[:3, :3] @ pair.source.offset
+    return raised
+
+
+def lower_pose(T: Array, pair: Pair) -> Array:
+    """The reverse of `raise_pose`."""
+    lowered = T.copy()
+    lowered[:3, 3] = T[:3, 3] - pair.target.offset + T[:3, :3] @ pair.source.offset
+    return lowered
+
+
+def raise_matches(matches: Correspondences, pair: Pair) -> Correspondences:
+    """Matches in the user's coordinates."""
+    return dataclasses.replace(
+        matches, source=matches.source + pair.source.offset, target=matches.target + pair.target.offset
+    )
+
+
+def lower_matches(matches: Any, pair: Pair) -> Correspondences:
+    """The user's own matches, as the stages take them.
+
+    Parameters
+    ----------
+    matches : Correspondences in the user's coordinates, or (K, 2) integers
+        Rows of source and target points.
+
+    Raises
+    ------
+    ValueError
+        Wrong shape or type, or a row that a cloud does not have.
+    """
+    if isinstance(matches, Correspondences):
+        return dataclasses.replace(
+            matches, source=matches.source - pair.source.offset, target=matches.target - pair.target.offset
+        )
+    rows = np.asarray(matches)
+    if rows.ndim != 2 or rows.shape[1] != 2 or rows.dtype.kind not in "iu":
+        raise ValueError(
+            f"matches: expected Correspondences or integer rows of shape (K, 2), got {rows.dtype} {rows.shape}"
+        )
+    for column, name, cloud in ((0, "source", pair.source), (1, "target", pair.target)):
+        if len(rows) and not (rows[:, column].min() >= 0 and rows[:, column].max() < len(cloud)):
+            raise ValueError(
+                f"matches: column {column} names rows {rows[:, column].min()} to {rows[:, column].max()}, "
+                f"but the {name} has {len(cloud)} points"
+            )
+    return Correspondences.of(pair.source.points[rows[:, 0]], pair.target.points[rows[:, 1]])

@@ -1,0 +1,91 @@
+# SPDX-License-Identifier: MIT
+"""What a cloud must be before any stage sees it."""
+
+from __future__ import annotations
+
+import os
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+MIN_POINTS = 20
+# Beyond this (the distance to the sun, in metres) squares of coordinates lose all meaning.
+_LARGEST = 1.5e11
+# A cloud thinner than a millionth of its length in two directions fixes no rotation about that length.
+_THINNEST = 1e-6
+
+
+def coordinates(x: Any, name: str) -> Array:
+    """Take (N, 3) float64 coordinates out of anything that holds points."""
+    if isinstance(x, (str, os.PathLike)):
+        from hybridreg.io import read_points
+
+        return read_points(x)
+    array = _as_array(x, name)
+    if array.dtype.kind not in "fiu":
+        raise ValueError(f"{name}: coordinates must be numbers, got dtype {array.dtype}; convert with astype(float)")
+    if array.size == 0:
+        raise ValueError(f"{name}: the cloud is empty (shape {array.shape}); it needs at least {MIN_POINTS} points")
+    upright = array.ndim == 2 and array.shape[1] >= 3
+    lying = array.ndim == 2 and array.shape[0] == 3 and array.shape[1] >= MIN_POINTS
+    if lying or not upright:
+        hint = "; transpose it" if lying else ""
+        raise ValueError(f"{name}: expected an array of shape (N, 3), got {array.shape}{hint}")
+    return np.array(array[:, :3], dtype=np.float64)
+
+
+def _as_array(x: Any, name: str) -> NDArray[Any]:
+    if hasattr(x, "detach"):  # torch tensor, on any device
+        x = x.detach().cpu().numpy()
+    elif hasattr(x, "point") and hasattr(x, "to_legacy"):  # Open3D tensor cloud
+        if "positions" not in x.point:
+            raise ValueError(f"{name}: the cloud is empty (it has no positions); it needs at least {MIN_POINTS} points")
+        x = x.point["positions"].cpu().numpy()
+    elif hasattr(x, "points"):  # Open3D legacy cloud, or anything shaped like one
+        x = x.points
+    try:
+        return np.asarray(x)
+    except (ValueError, TypeError) as error:
+        raise ValueError(f"{name}: cannot read an array of shape (N, 3) from {type(x).__name__}: {error}") from error
+
+
+def finite(points: Array, name: str, *, drop: bool) -> Array:
+    """Refuse rows with a NaN or an infinity, or leave them out where that was asked for."""
+    good = np.isfinite(points).all(axis=1)
+    n_bad = len(points) - int(good.sum())
+    if n_bad and not drop:
+        raise ValueError(
+            f"{name}: {n_bad} of {len(points)} points are not finite (the first is row {int(np.argmin(good))}); "
+            'remove them or pass nonfinite="drop"'
+        )
+    return points[good] if n_bad else points
+
+
+def check(points: Array, name: str) -> None:
+    """Refuse clouds that no pose can be computed from.
+
+    Raises
+    ------
+    ValueError
+        Fewer than 20 points, points that are not finite or beyond 1.5e11 m, all in one place, all on one line.
+    """
+    finite(points, name, drop=False)
+    if len(points) == 0:
+        raise ValueError(f"{name}: the cloud is empty; it needs at least {MIN_POINTS} points")
+    if len(points) < MIN_POINTS:
+        raise ValueError(f"{name}: {len(points)} points are too few; it needs at least {MIN_POINTS}")
+    largest = float(np.abs(points).max())
+    if largest > _LARGEST:
+        raise ValueError(f"{name}: a coordinate of {largest:.3g} m cannot be real; check the file and its unit")
+    centred = points - points.mean(axis=0)
+    extent = np.ptp(points, axis=0)
+    if not extent.max() > 1e-9 * max(largest, 1e-300):
+        raise ValueError(f"{name}: all {len(points)} points lie in one place; a pose needs points spread in space")
+    spread = np.linalg.svd(centred.T @ centred / extent.max() ** 2, compute_uv=False)
+    if spread[1] <= _THINNEST**2 * spread[0]:
+        raise ValueError(
+            f"{name}: all {len(points)} points lie on one line; the rotation about it is free, add points off the line"
+        )

@@ -1,0 +1,19 @@
+# SPDX-License-Identifier: MIT
+"""Reading clouds and photographs; writing clouds, transforms and records."""
+
+from hybridreg.io.atomic import atomic_path, write_bytes, write_text
+from hybridreg.io.image import as_image, read_image
+from hybridreg.io.points import read_points
+from hybridreg.io.write import write_json, write_matrix, write_points
+
+__all__ = [
+    "as_image",
+    "atomic_path",
+    "read_image",
+    "read_points",
+    "write_bytes",
+    "write_json",
+    "write_matrix",
+    "write_points",
+    "write_text",
+]

@@ -1,0 +1,97 @@
+# SPDX-License-Identifier: MIT
+"""Files that are written whole or not at all."""
+
+from __future__ import annotations
+
+import os
+import secrets
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+
+@contextmanager
+def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
+    """Give a temporary file to write to; it takes the place of `path` when the block ends well.
+
+    The temporary file lies in the same folder and has the same suffix (many writers choose their format by
+    it). It is flushed to the disk before it is renamed, so that after a crash `path` holds either the old
+    content or the new. When the block raises, the temporary file is removed and `path` is as it was.
+
+    Parameters
+    ----------
+    path : path
+        The file to write. A symbolic link is followed, not replaced.
+
+    Yields
+    ------
+    Path
+        An existing, empty file to write to or over.
+
+    Raises
+    ------
+    FileNotFoundError
+        The folder of `path` does not exist.
+    IsADirectoryError
+        `path` is a folder.
+    ValueError
+        `path` is a device or a pipe, which a rename would destroy.
+    """
+    target = _writable_target(path)
+    temporary = _fresh_file(target)
+    try:
+        yield temporary
+        if target.exists():
+            shutil.copymode(target, temporary)
+        _flush_to_disk(temporary)
+        os.replace(temporary, target)
+    except BaseException:
+        temporary.unlink(missing_ok=True)
+        raise
+    _flush_folder(target.parent)
+
+
+def write_bytes(path: str | os.PathLike[str], data: bytes) -> None:
+    """Write `data` to `path`, whole or not at all (see `atomic_path`)."""
+    with atomic_path(path) as temporary:
+        temporary.write_bytes(data)
+
+
+def write_text(path: str | os.PathLike[str], text: str) -> None:
+    """Write `text` to `path` as UTF-8 with newlines as given, whole or not at all (see `atomic_path`)."""
+    write_bytes(path, text.encode("utf-8"))
+
+
+def _writable_target(path: str | os.PathLike[str]) -> Path:
+    target = Path(os.path.realpath(path))
+    if target.is_dir():
+        raise IsADirectoryError(f"{path}: is a folder; name a file inside it")
+    if target.exists() and not target.is_file():
+        raise ValueError(f"{path}: is a device or a pipe, not a file; choose another name")
+    if not target.parent.is_dir():
+        raise FileNotFoundError(f"{path}: the folder {target.parent} does not exist; create it first")
+    return target
+
+
+def _fresh_file(target: Path) -> Path:
+    # Not tempfile: its files are readable by their owner alone, whatever the umask says.
+    temporary = target.with_name(f".{secrets.token_hex(8)}{target.suffix}")
+    os.close(os.open(temporary, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666))
+    return temporary
+
+
+def _flush_to_disk(path: Path) -> None:
+    with path.open("rb+") as file:
+        os.fsync(file.fileno())
+
+
+def _flush_folder(folder: Path) -> None:
+    # The rename itself lives in the folder. Windows cannot open a folder, and needs no such step.
+    if os.name != "posix":
+        return
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)

@@ -1,0 +1,36 @@
+# SPDX-License-Identifier: MIT
+"""How a bad file is reported: its name, what is wrong with it, and the cure."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+FETCH_AGAIN = "copy, download or export it again"
+
+
+def fault(name: str, problem: str, cure: str = FETCH_AGAIN) -> ValueError:
+    """The error to raise for the file called `name`."""
+    return ValueError(f"{name}: {problem}; {cure}")
+
+
+def shorten(text: object, length: int = 60) -> str:
+    """`text` quoted for a message, cut where a damaged file would flood the screen."""
+    shown = str(text)
+    return repr(shown if len(shown) <= length else shown[:length] + "...")
+
+
+@contextmanager
+def foreign_parser(name: str, kind: str) -> Iterator[None]:
+    """Turn whatever someone else's parser throws at a damaged file into one `ValueError`.
+
+    zipfile, numpy's header reader, laspy and lazrs raise a dozen kinds of exceptions on damaged bytes, and
+    lazrs' Rust panics do not even derive from `Exception`. Our own parsers do not hide behind this.
+    """
+    try:
+        yield
+    except (KeyboardInterrupt, SystemExit, GeneratorExit, ImportError):
+        raise
+    except BaseException as error:
+        reason = shorten(str(error) or type(error).__name__, 200)
+        raise fault(name, f"cannot be read as {kind} ({reason})") from error

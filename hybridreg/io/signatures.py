@@ -1,0 +1,70 @@
+# SPDX-License-Identifier: MIT
+"""What a file is by its first bytes, whatever its name says."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from hybridreg.io.faults import FETCH_AGAIN
+
+_UNPACK = "unpack it first"
+_NO_CLOUD = "give the point cloud's own file"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Kind:
+    """A recognised kind of file.
+
+    `suffix` is set where another of our readers takes it; `cure` tells what to do with the others.
+    """
+
+    words: str
+    cure: str = _NO_CLOUD
+    suffix: str = ""
+
+
+_KINDS: tuple[tuple[bytes, Kind], ...] = (
+    (b"ply\n", Kind(words="a PLY file", suffix=".ply")),
+    (b"ply\r", Kind(words="a PLY file", suffix=".ply")),
+    (b"# .PCD", Kind(words="a PCD file", suffix=".pcd")),
+    (b"\x93NUMPY", Kind(words="a NumPy array", suffix=".npy")),
+    (b"LASF", Kind(words="a LAS file", suffix=".las")),
+    (b"PK\x03\x04", Kind(words="a zip archive", cure=_UNPACK, suffix=".npz")),
+    (b"\x1f\x8b\x08", Kind(words="compressed with gzip", cure=_UNPACK)),
+    (b"BZh", Kind(words="compressed with bzip2", cure=_UNPACK)),
+    (b"\xfd7zXZ\x00", Kind(words="compressed with xz", cure=_UNPACK)),
+    (b"\x28\xb5\x2f\xfd", Kind(words="compressed with zstd", cure=_UNPACK)),
+    (b"7z\xbc\xaf\x27\x1c", Kind(words="a 7z archive", cure=_UNPACK)),
+    (b"\xff\xd8\xff", Kind(words="a JPEG image")),
+    (b"\x89PNG\r\n", Kind(words="a PNG image")),
+    (b"GIF8", Kind(words="a GIF image")),
+    (b"%PDF-", Kind(words="a PDF document")),
+    (b"\x89HDF\r\n", Kind(words="an HDF5 file", cure="export the points as .ply or .npy")),
+    (b"#ROSBAG", Kind(words="a ROS bag", cure="export one scan of it as .pcd or .npy")),
+    (b"SQLite format 3", Kind(words="a database (a ROS 2 bag?)", cure="export one scan of it as .pcd")),
+    (b"version https://git-lfs", Kind(words="a Git LFS pointer, not the data", cure="run `git lfs pull`")),
+    (b"version https://hawser", Kind(words="a Git LFS pointer, not the data", cure="run `git lfs pull`")),
+)
+_WEB_PAGE = Kind(words="a web page, probably an error message of the server", cure=FETCH_AGAIN)
+
+
+def kind_of(data: bytes) -> Kind | None:
+    """The kind of file that begins with `data`; None where no signature fits."""
+    for signature, kind in _KINDS:
+        if data.startswith(signature):
+            return kind
+    opening = data[:256].lstrip(b"\xef\xbb\xbf \t\r\n").lower()
+    if opening.startswith((b"<!doctype", b"<html", b"<?xml", b"<head")):
+        return _WEB_PAGE
+    return None
+
+
+def looks_like_text(data: bytes) -> bool:
+    """Whether the first 512 bytes are printable ASCII, as no float32 cloud's are."""
+    head = data[:512]
+    return bool(head) and all(32 <= byte < 127 or byte in (9, 10, 13) for byte in head)
+
+
+def looks_binary(data: bytes) -> bool:
+    """Whether the first 4096 bytes hold a zero byte, as no text in ASCII, UTF-8 or Latin-1 does."""
+    return b"\x00" in data[:4096]

@@ -1,0 +1,105 @@
+# SPDX-License-Identifier: MIT
+"""What the stages hand to one another: overlap, correspondences, pose."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False)
+class Overlap:
+    """Probability of each downsampled point to lie in the part that both sensors saw.
+
+    Attributes
+    ----------
+    source : (n,) float64 in [0, 1]
+    target : (m,) float64 in [0, 1]
+    """
+
+    source: Array
+    target: Array
+
+    @classmethod
+    def full(cls, n_source: int, n_target: int) -> Overlap:
+        """Every point counts: what a pipeline without an overlap stage uses."""
+        return cls(np.ones(n_source), np.ones(n_target))
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Correspondences:
+    """Pairs of points held to be the same place.
+
+    Attributes
+    ----------
+    source, target : (K, 3) float64
+        Coordinates in metres, each in its cloud's frame.
+    weight : (K,) float64, not negative
+    group : (K,) int64 or None
+        The superpoint pair that a match came from; local-to-global estimation needs it.
+    source_index, target_index : (K,) int64 or None
+        Rows of the levels' points, where the matches are such.
+    """
+
+    source: Array
+    target: Array
+    weight: Array
+    group: Indices | None = None
+    source_index: Indices | None = None
+    target_index: Indices | None = None
+
+    def __post_init__(self) -> None:
+        n = len(self.source)
+        for name in ("source", "target", "weight", "group", "source_index", "target_index"):
+            column = getattr(self, name)
+            expected = (n, 3) if name in ("source", "target") else (n,)
+            if column is not None and column.shape != expected:
+                raise ValueError(f"matches: {name} has shape {column.shape}, expected {expected}")
+
+    def __len__(self) -> int:
+        return len(self.source)
+
+    @classmethod
+    def of(cls, source: Any, target: Any, weight: Any = None) -> Correspondences:
+        """Matches from two arrays (K, 3) of coordinates, and weights (K,) that default to one."""
+        source = np.asarray(source, dtype=np.float64)
+        weight = np.ones(len(source)) if weight is None else np.asarray(weight, dtype=np.float64)
+        return cls(source=source, target=np.asarray(target, dtype=np.float64), weight=weight)
+
+    @classmethod
+    def none(cls) -> Correspondences:
+        """No matches at all."""
+        return cls(source=np.zeros((0, 3)), target=np.zeros((0, 3)), weight=np.zeros(0))
+
+
+@dataclass(frozen=True, eq=False)
+class Pose:
+    """An estimated pose.
+
+    Attributes
+    ----------
+    T : (4, 4) float64
+        Maps source to target.
+    inliers : (K,) bool or None
+        Which matches agree with it.
+    rivals : (r, 4, 4) float64
+        Other poses that the data nearly supports, best first.
+    found : bool
+        False where the stage had nothing to work with and T is only a placeholder (the identity).
+    """
+
+    T: Array
+    inliers: NDArray[np.bool_] | None = None
+    rivals: Array = field(default_factory=lambda: np.zeros((0, 4, 4)))
+    found: bool = True
+
+    @classmethod
+    def unknown(cls, n_matches: int = 0) -> Pose:
+        """No pose could be found: the identity, marked as such."""
+        return cls(np.eye(4), inliers=np.zeros(n_matches, dtype=bool), found=False)

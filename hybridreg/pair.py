@@ -1,0 +1,87 @@
+# SPDX-License-Identifier: MIT
+"""Two clouds to align, without and with their true pose."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hybridreg import se3
+from hybridreg.cloud import PointCloud
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Pair:
+    """What a pipeline receives. It has no field for the truth, so that no stage can peek.
+
+    Attributes
+    ----------
+    source, target : PointCloud
+        The source moves, the target stays.
+    image : (H, W, 3) uint8 or None
+        One photograph of the common view, uncalibrated, RGB.
+    id : str
+        Seeds the pair's random generator together with the run's seed.
+    meta : mapping
+        Free facts for reports. Never the pose.
+    """
+
+    source: PointCloud
+    target: PointCloud
+    image: NDArray[np.uint8] | None = None
+    id: str = "pair"
+    meta: Mapping[str, Any] = field(default_factory=dict)
+
+    @classmethod
+    def of(
+        cls,
+        source: Any,
+        target: Any,
+        image: Any = None,
+        *,
+        id: str = "pair",
+        meta: Mapping[str, Any] | None = None,
+        nonfinite: Literal["raise", "drop"] = "raise",
+    ) -> Pair:
+        """Build a pair from anything `PointCloud.of` takes, and a path or an array for the image."""
+        return cls(
+            source=PointCloud.of(source, name="source", nonfinite=nonfinite),
+            target=PointCloud.of(target, name="target", nonfinite=nonfinite),
+            image=None if image is None else _image(image),
+            id=id,
+            meta=dict(meta or {}),
+        )
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class LabelledPair:
+    """A pair with its true pose: for training and evaluation only.
+
+    Attributes
+    ----------
+    pair : Pair
+    T_target_source : (4, 4) float64
+        Maps source points, as the user gave them, to target points.
+    overlap : float or None
+        Share of source points that the target saw too, where the data set tells it.
+    """
+
+    pair: Pair
+    T_target_source: Array
+    overlap: float | None = None
+
+    def __post_init__(self) -> None:
+        se3.check(self.T_target_source, f"pair {self.pair.id}: T_target_source")
+
+
+def _image(image: Any) -> NDArray[np.uint8]:
+    from hybridreg.io import as_image, read_image
+
+    return read_image(image) if isinstance(image, (str, os.PathLike)) else as_image(image)

@@ -1,0 +1,81 @@
+# SPDX-License-Identifier: MIT
+"""Pipelines by name: TOML files beside this one, in the format that `Pipeline.save` writes."""
+
+from __future__ import annotations
+
+import os
+import sys
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+from hybridreg.slots import SLOTS
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
+
+DEFAULT = "kiss-gicp"
+
+
+def names() -> list[str]:
+    """Names that `Pipeline.preset` takes."""
+    return sorted(f.name.removesuffix(".toml") for f in files(__name__).iterdir() if f.name.endswith(".toml"))
+
+
+def load(name: str) -> dict[str, Any]:
+    """Slots of a preset, as tables.
+
+    Raises
+    ------
+    KeyError
+        A name that does not exist; it lists those that do.
+    """
+    if name not in names():
+        raise KeyError(f"no preset is called {name!r}. Known: {', '.join(names())}")
+    return _slots(files(__name__).joinpath(f"{name}.toml").read_text(encoding="utf-8"), name)
+
+
+def read(path: str | os.PathLike[str]) -> dict[str, Any]:
+    """Slots of a pipeline file, as tables.
+
+    Raises
+    ------
+    FileNotFoundError
+        There is no such file.
+    ValueError
+        Not TOML, or a table that is no slot.
+    """
+    try:
+        text = Path(path).read_text(encoding="utf-8")
+    except (UnicodeDecodeError, IsADirectoryError) as error:
+        raise ValueError(f"{os.fspath(path)}: not a TOML file ({error})") from error
+    return _slots(text, os.fspath(path))
+
+
+def write(path: str | os.PathLike[str], slots: dict[str, Any]) -> None:
+    """Write slots as TOML, whole or not at all."""
+    import tomli_w
+
+    from hybridreg.io.atomic import atomic_path
+
+    for slot, table in slots.items():
+        if ":" in table["stage"]:
+            raise ValueError(
+                f"{slot}: {table['stage']} is not registered, so a file could not name it; register it through the "
+                "entry-point group 'hybridreg.stages'"
+            )
+    with atomic_path(path) as temporary:
+        Path(temporary).write_text(tomli_w.dumps(slots), encoding="utf-8")
+
+
+def _slots(text: str, origin: str) -> dict[str, Any]:
+    try:
+        tables = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise ValueError(f"{origin}: not a TOML file ({error})") from error
+    unknown = set(tables) - {*SLOTS, "voxel"}
+    if unknown:
+        raise ValueError(f"{origin}: {', '.join(sorted(unknown))} is no slot; the slots are {', '.join(SLOTS)}")
+    return tables

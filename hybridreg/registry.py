@@ -1,0 +1,89 @@
+# SPDX-License-Identifier: MIT
+"""Short names of stages, and the classes behind them, imported when they are asked for."""
+
+from __future__ import annotations
+
+import difflib
+from functools import cache
+from importlib import import_module
+from importlib.metadata import entry_points
+from typing import Any
+
+from hybridreg.slots import SLOTS
+
+ENTRY_POINTS = "hybridreg.stages"
+
+BUILT_IN = {
+    "downsample.voxel": "hybridreg.classical.voxel:VoxelGrid",
+    "downsample.random": "hybridreg.classical.sampling:RandomSample",
+    "downsample.none": "hybridreg.classical.sampling:AllPoints",
+    "overlap.none": "hybridreg.classical.nothing:NoOverlap",
+    "overlap.visibility": "hybridreg.classical.visibility:Visibility",
+    "match.none": "hybridreg.classical.nothing:NoMatch",
+    "match.given": "hybridreg.classical.nothing:GivenMatches",
+    "match.fpfh": "hybridreg.classical.fpfh:Fpfh",
+    "estimate.identity": "hybridreg.classical.nothing:Identity",
+    "estimate.ransac": "hybridreg.classical.ransac:Ransac",
+    "estimate.svd": "hybridreg.classical.svd:WeightedSvd",
+    "estimate.fgr": "hybridreg.classical.fgr:Fgr",
+    "estimate.kiss": "hybridreg.classical.kiss:KissMatcher",
+    "refine.none": "hybridreg.classical.nothing:NoRefinement",
+    "refine.icp": "hybridreg.classical.icp:Icp",
+    "refine.gicp": "hybridreg.classical.gicp:Gicp",
+    "refine.kiss-icp": "hybridreg.classical.kiss_icp:KissIcp",
+}
+
+
+@cache
+def known() -> dict[str, str]:
+    """Every stage that can be named, as `slot.name` to `module:Class`; plug-ins included."""
+    plugged = {point.name: point.value for point in entry_points(group=ENTRY_POINTS)}
+    # A plug-in cannot take a built-in's name: the same pipeline file must mean the same everywhere.
+    return {**plugged, **BUILT_IN}
+
+
+def names(slot: str) -> list[str]:
+    """Short names of one slot's stages."""
+    return sorted(key.partition(".")[2] for key in known() if key.startswith(f"{slot}."))
+
+
+def load(slot: str, name: str) -> type[Any]:
+    """Class of a stage.
+
+    Raises
+    ------
+    KeyError
+        For a name that nobody registered; it lists the known ones.
+    """
+    if slot not in SLOTS:
+        raise KeyError(f"no slot is called {slot!r}; the slots are {', '.join(SLOTS)}")
+    target = known().get(f"{slot}.{name}")
+    if target is None:
+        near = difflib.get_close_matches(name, names(slot), n=1)
+        hint = f"; did you mean {near[0]!r}?" if near else ""
+        raise KeyError(f"no {slot} stage is called {name!r}{hint} Known: {', '.join(names(slot))}")
+    module, _, attribute = target.partition(":")
+    cls: type[Any] = getattr(import_module(module), attribute)
+    return cls
+
+
+def name_of(stage: Any) -> str | None:
+    """Registered `slot.name` of a stage, or None for a class that nobody registered."""
+    cls = type(stage)
+    here = f"{cls.__module__}:{cls.__qualname__}"
+    return next((key for key, target in known().items() if target == here), None)
+
+
+def slot_fits(slot: str, *, needs: frozenset[str] | None = None, gives: str | None = None) -> list[str]:
+    """Names of a slot's stages whose needs lie within `needs`, or that give the word `gives`."""
+    found = []
+    for name in names(slot):
+        try:
+            cls = load(slot, name)
+        except ImportError:
+            continue
+        if needs is not None and getattr(cls, "needs", frozenset()) <= needs:
+            found.append(name)
+        if gives is not None and gives in getattr(cls, "gives", frozenset()):
+            found.append(name)
+    return found

@@ -1,0 +1,119 @@
+# SPDX-License-Identifier: MIT
+"""What a registration returns."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hybridreg.matches import Correspondences
+
+Array = NDArray[np.float64]
+Word = Literal["ok", "doubtful", "failed"]
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class RegistrationResult:
+    """The pose, and whether to believe it.
+
+    Attributes
+    ----------
+    transformation : (4, 4) float64
+        Maps source points to target points, `q = R p + t`, in the coordinates that the user gave. Its rotation
+        is orthogonal with determinant +1. `T_target_source` is another name for it.
+    verdict : "ok", "doubtful" or "failed"
+    confidence : float in [0, 1]
+    reasons : tuple of str
+        Why the verdict is what it is, in words.
+    fitness : float
+        Share of the source's points that have a target point within `max_distance`. As in Open3D.
+    inlier_rmse : float
+        Root mean square distance of those points, metres. As in Open3D.
+    correspondence_set : (K, 2) int64
+        Those points: row in the source, row of the nearest target point. As in Open3D.
+    fitness_target : float
+        The same share seen from the target.
+    max_distance : float
+        Metres.
+    information : (6, 6) float64
+        Sum of J^T J of point-to-plane distances in metres at the pose, rotation (radians) before translation,
+        about the centre of the overlap; a small eigenvalue is a direction that the data leaves open.
+    rivals : (r, 4, 4) float64
+        Other poses that explain the data nearly as well.
+    matches : Correspondences
+        What the pose was estimated from, in the coordinates that the user gave.
+    evidence : mapping of str to float
+        The numbers behind the verdict.
+    notes : tuple of str
+        Defaults that were chosen and caps that bit.
+    seconds : mapping of str to float
+        Wall time of each stage.
+    peak_memory_mb : float or None
+        Highest resident memory of the process during the run.
+    seed : int
+    spec : mapping
+        The pipeline that made it, as `Pipeline.save` writes it.
+    """
+
+    transformation: Array
+    verdict: Word
+    confidence: float
+    reasons: tuple[str, ...]
+    fitness: float
+    inlier_rmse: float
+    correspondence_set: NDArray[np.int64] = field(repr=False)
+    fitness_target: float
+    max_distance: float
+    information: Array = field(repr=False)
+    rivals: Array = field(repr=False)
+    matches: Correspondences = field(repr=False)
+    evidence: Mapping[str, float] = field(repr=False)
+    notes: tuple[str, ...]
+    seconds: Mapping[str, float]
+    peak_memory_mb: float | None
+    seed: int
+    spec: Mapping[str, Any] = field(repr=False)
+
+    @property
+    def T_target_source(self) -> Array:
+        """The transformation, under the name that tells its direction."""
+        return self.transformation
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain numbers, lists and strings; the per-point arrays become their counts."""
+        left_out = {"correspondence_set", "matches"}
+        plain = {f.name: _plain(getattr(self, f.name)) for f in fields(self) if f.name not in left_out}
+        return {**plain, "n_correspondences": len(self.correspondence_set), "n_matches": len(self.matches)}
+
+    def to_json(self) -> str:
+        """`to_dict` as JSON text."""
+        return json.dumps(self.to_dict(), indent=2)
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write the result whole: `.json` everything, `.txt` the 4x4 matrix alone."""
+        from hybridreg.io import write_json, write_matrix
+
+        if os.fspath(path).endswith(".txt"):
+            write_matrix(path, self.transformation)
+        elif os.fspath(path).endswith(".json"):
+            write_json(path, self.to_dict())
+        else:
+            raise ValueError(f"{os.fspath(path)}: a result is saved as .json (everything) or .txt (the 4x4 matrix)")
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, np.ndarray):
+        return value.tolist()
+    if isinstance(value, Mapping):
+        return {key: _plain(item) for key, item in value.items()}
+    if isinstance(value, (tuple, list)):
+        return [_plain(item) for item in value]
+    if isinstance(value, np.generic):
+        return value.item()
+    return value

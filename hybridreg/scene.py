@@ -1,0 +1,74 @@
+# SPDX-License-Identifier: MIT
+"""A pair after downsampling, with what the stages of one run share."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable
+from dataclasses import dataclass, field
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hybridreg.pair import Pair
+
+Array = NDArray[np.float64]
+Value = TypeVar("Value")
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Level:
+    """One downsampled cloud.
+
+    Attributes
+    ----------
+    points : (n, 3) float64
+        In the frame of the pair's cloud (its offset taken off), metres.
+    spacing : float
+        Typical distance of neighbours, metres: the voxel where a grid made the level.
+    viewpoint : (3,) float64 or None
+        Where the sensor stood.
+    """
+
+    points: Array
+    spacing: float
+    viewpoint: Array | None = None
+
+    def __len__(self) -> int:
+        return len(self.points)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Scene:
+    """What downsampling gives, and every later stage receives.
+
+    Attributes
+    ----------
+    pair : Pair
+    source, target : Level
+    notes : list of str
+        What a stage wants the user to read in the result: a default it chose, a cap that bit.
+    """
+
+    pair: Pair
+    source: Level
+    target: Level
+    notes: list[str] = field(default_factory=list)
+    _shared: dict[Hashable, Any] = field(default_factory=dict, repr=False)
+
+    @property
+    def spacing(self) -> float:
+        """The coarser of the two levels' spacings, metres: the resolution at which the clouds can be compared."""
+        return max(self.source.spacing, self.target.spacing)
+
+    def shared(self, key: Hashable, make: Callable[[], Value]) -> Value:
+        """Return `make()`, computed once a run for each key (normals, features, a network's encoding)."""
+        if key not in self._shared:
+            self._shared[key] = make()
+        value: Value = self._shared[key]
+        return value
+
+    def note(self, text: str) -> None:
+        """Leave a sentence for the result, once."""
+        if text not in self.notes:
+            self.notes.append(text)

@@ -1,0 +1,119 @@
+# SPDX-License-Identifier: MIT
+"""Rigid motions as 4x4 matrices that map source points to target points, `q = R p + t`."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+def from_rt(R: Array, t: Array) -> Array:
+    """Join rotation (..., 3, 3) and translation (..., 3) to (..., 4, 4)."""
+    T = np.zeros((*R.shape[:-2], 4, 4))
+    T[..., :3, :3] = R
+    T[..., :3, 3] = t
+    T[..., 3, 3] = 1.0
+    return T
+
+
+def apply(T: Array, points: Array) -> Array:
+    """Move points (N, 3) by T (4, 4)."""
+    return points @ T[:3, :3].T + T[:3, 3]
+
+
+def inverse(T: Array) -> Array:
+    """Inverse of a rigid motion (4, 4)."""
+    R = T[:3, :3].T
+    return from_rt(R, -R @ T[:3, 3])
+
+
+def exp(twist: Array) -> Array:
+    """Rigid motion (4, 4) of a twist (6,): rotation vector in radians first, then the translation itself.
+
+    The translation is not coupled to the rotation, which is what a Gauss-Newton step on
+    `R p + t` linearised in place needs.
+    """
+    return from_rt(rotation_about(twist[:3]), np.asarray(twist[3:], dtype=np.float64))
+
+
+def rotation_about(vector: Array) -> Array:
+    """Rotation (3, 3) about a vector (3,) whose length is the angle in radians."""
+    from scipy.spatial.transform import Rotation
+
+    R: Array = Rotation.from_rotvec(vector).as_matrix()
+    return R
+
+
+def log_rotation(R: Array) -> Array:
+    """Vector (3,) in radians that `rotation_about` turns into R (3, 3); its length lies in [0, pi]."""
+    from scipy.spatial.transform import Rotation
+
+    vector: Array = Rotation.from_matrix(R).as_rotvec()
+    return vector
+
+
+def skew(v: Array) -> Array:
+    """Matrix (3, 3) of the cross product with v (3,)."""
+    return np.array([[0.0, -v[2], v[1]], [v[2], 0.0, -v[0]], [-v[1], v[0], 0.0]])
+
+
+def yaw(angle_deg: float) -> Array:
+    """Rigid motion (4, 4) that turns about z."""
+    return from_rt(rotation_about(np.array([0.0, 0.0, np.deg2rad(angle_deg)])), np.zeros(3))
+
+
+def project(M: Array) -> Array:
+    """Rotation nearest to a 3x3 matrix: orthogonal, determinant +1."""
+    U, _, Vt = np.linalg.svd(M)
+    flip = np.sign(np.linalg.det(U @ Vt)) or 1.0
+    return U @ np.diag([1.0, 1.0, flip]) @ Vt
+
+
+def angle_deg(R: Array) -> float:
+    """Angle of a rotation (3, 3), in [0, 180] degrees.
+
+    From sine and cosine together: the arc cosine alone loses half the digits near 0 and 180.
+    """
+    sine = 0.5 * np.linalg.norm([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]])
+    return float(np.degrees(np.arctan2(sine, 0.5 * (np.trace(R) - 1.0))))
+
+
+def random_rotation(rng: np.random.Generator) -> Array:
+    """Uniformly distributed rotation (3, 3)."""
+    quaternion = rng.normal(size=4)
+    w, x, y, z = quaternion / np.linalg.norm(quaternion)
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+
+
+def check(T: Any, name: str = "T", tolerance: float = 1e-4) -> Array:
+    """Return T as (4, 4) float64 if it is a rigid motion.
+
+    Raises
+    ------
+    ValueError
+        Wrong shape, not finite, last row not (0, 0, 0, 1), or a rotation off by more than `tolerance`.
+    """
+    matrix = np.asarray(T, dtype=np.float64)
+    if matrix.shape != (4, 4):
+        raise ValueError(f"{name}: expected shape (4, 4), got {matrix.shape}")
+    if not np.isfinite(matrix).all():
+        raise ValueError(f"{name}: the matrix is not finite")
+    if not np.allclose(matrix[3], [0, 0, 0, 1], atol=1e-9):
+        raise ValueError(f"{name}: the last row is {matrix[3]}, expected [0 0 0 1]; is the matrix transposed?")
+    error = float(np.abs(matrix[:3, :3] @ matrix[:3, :3].T - np.eye(3)).max())
+    if error > tolerance or np.linalg.det(matrix[:3, :3]) < 0:
+        raise ValueError(
+            f"{name}: the upper left 3x3 block is no rotation (R R^T is off by {error:.2g}, "
+            f"determinant {np.linalg.det(matrix[:3, :3]):.3g}); remove scale or reflection"
+        )
+    return matrix

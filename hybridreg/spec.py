@@ -1,0 +1,85 @@
+# SPDX-License-Identifier: MIT
+"""Stages as plain tables, for TOML files and stored results.
+
+A table names a registered stage and its fields: `{stage = "match.fpfh", radius = 1.25}`. Reading one can only
+make objects of registered classes, so a file from a stranger cannot run code of its own.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from hybridreg import registry
+from hybridreg.stage import own_params
+
+
+def to_table(stage: Any, slot: str | None = None) -> dict[str, Any]:
+    """Table of a stage; inside its own slot the short name is enough."""
+    registered = registry.name_of(stage)
+    if registered is None:
+        name = f"{type(stage).__module__}:{type(stage).__qualname__}"
+    else:
+        name = registered.removeprefix(f"{slot}.") if slot else registered
+    fields = own_params(stage) if dataclasses.is_dataclass(stage) else {}
+    # TOML has no null; a field left out takes its default, which is None wherever a field may be None.
+    return {"stage": name, **{key: _plain(value) for key, value in fields.items() if value is not None}}
+
+
+def _plain(value: Any) -> Any:
+    if dataclasses.is_dataclass(value) and not isinstance(value, type):
+        return to_table(value)
+    if isinstance(value, (tuple, list, np.ndarray)):
+        return [_plain(item) for item in value]
+    if isinstance(value, np.generic):
+        return value.item()
+    if isinstance(value, (str, int, float, bool)):
+        return value
+    raise ValueError(f"{value!r} of type {type(value).__name__} cannot be written to a table")
+
+
+def from_table(table: Any, slot: str | None = None) -> Any:
+    """Stage of a table, or of a bare name.
+
+    Raises
+    ------
+    KeyError
+        A stage that nobody registered.
+    ValueError
+        A field that the stage does not have, or a table without a `stage`.
+    """
+    if isinstance(table, str):
+        table = {"stage": table}
+    if not isinstance(table, Mapping) or not isinstance(table.get("stage"), str):
+        raise ValueError(f"expected a stage's name or a table with a `stage`, got {table!r}")
+    own_slot, name = _resolve(table["stage"], slot)
+    cls = registry.load(own_slot, name)
+    fields = {key: _restore(value) for key, value in table.items() if key != "stage"}
+    try:
+        return cls(**fields)
+    except TypeError as error:
+        known = [f.name for f in dataclasses.fields(cls)] if dataclasses.is_dataclass(cls) else []
+        raise ValueError(f"{own_slot} stage {name!r}: {error}; its fields are {', '.join(known)}") from error
+
+
+def _resolve(name: str, slot: str | None) -> tuple[str, str]:
+    if ":" in name:
+        raise KeyError(
+            f"{name!r} is a class, and files may only name registered stages; register it through the entry-point "
+            f"group {registry.ENTRY_POINTS!r}"
+        )
+    if slot is not None and not name.startswith(f"{slot}."):
+        return slot, name
+    own_slot, _, short = name.partition(".")
+    return own_slot, short
+
+
+def _restore(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return from_table(value)
+    if isinstance(value, list):
+        return tuple(_restore(item) for item in value)
+    return value

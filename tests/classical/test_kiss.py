@@ -1,0 +1,77 @@
+# SPDX-License-Identifier: MIT
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import hybridreg as hr
+from hybridreg import se3
+from hybridreg.matches import Correspondences
+from hybridreg.scene import Scene
+
+pytest.importorskip("kiss_matcher")
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def run(scene: Scene, **fields: tuple[float, ...]) -> hr.Pose:
+    return hr.KissMatcher(**fields)(scene, Correspondences.none(), np.random.default_rng(0))
+
+
+def test_finds_the_courtyard_from_any_yaw(courtyard: tuple[hr.Pair, np.ndarray]) -> None:
+    pair, truth = courtyard
+    turned = hr.Pair.of(se3.apply(se3.yaw(137.0), pair.source.points), pair.target.points)
+    pose = run(hr.VoxelGrid(voxel=0.4)(turned))
+    error = se3.inverse(truth) @ pose.T @ se3.yaw(137.0)
+    assert pose.found
+    assert se3.angle_deg(error[:3, :3]) < 5.0
+    assert np.linalg.norm(error[:3, 3]) < 1.0
+
+
+def test_repeats_to_the_last_bit(courtyard_scene: tuple[Scene, np.ndarray]) -> None:
+    scene = courtyard_scene[0]
+    first = run(scene)
+    for _ in range(2):
+        again = run(scene)
+        assert np.array_equal(first.T, again.T)
+        assert np.array_equal(first.rivals, again.rivals)
+
+
+def test_each_voxel_size_that_answers_is_kept_as_a_rival(courtyard_scene: tuple[Scene, np.ndarray]) -> None:
+    pose = run(courtyard_scene[0], voxels=(0.3, 0.5))
+    assert pose.rivals.shape == (1, 4, 4)
+
+
+HOSTILE = """
+import sys, numpy as np, hybridreg as hr
+from hybridreg.matches import Correspondences
+rng = np.random.default_rng(int(sys.argv[2]))
+n = int(sys.argv[3])
+cloud = {
+    "cube": lambda: rng.uniform(0, 20, (n, 3)),
+    "line": lambda: np.c_[np.linspace(0, 50, n), rng.normal(0, 0.01, (n, 2))],
+    "plane": lambda: np.c_[rng.uniform(0, 30, (n, 2)), rng.normal(0, 1e-3, n)],
+    "apart": lambda: rng.uniform(0, 1e4, (n, 3)),
+    "twice": lambda: np.repeat(rng.uniform(0, 20, (n // 4, 3)), 4, axis=0),
+}[sys.argv[1]]
+scene = hr.Scene(
+    pair=hr.Pair.of(cloud(), cloud()),
+    source=hr.Level(points=cloud(), spacing=0.4), target=hr.Level(points=cloud(), spacing=0.4),
+)
+pose = hr.KissMatcher()(scene, Correspondences.none(), rng)
+print("survived", pose.found)
+"""
+
+
+@pytest.mark.parametrize("kind", ["cube", "line", "plane", "apart", "twice"])
+@pytest.mark.parametrize("n", [20, 50, 200])
+def test_no_crash_reaches_the_user(kind: str, n: int) -> None:
+    """In a process of its own: what is guarded against here is a segmentation fault of the wheel."""
+    done = subprocess.run(
+        [sys.executable, "-c", HOSTILE, kind, "0", str(n)], cwd=ROOT, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    assert "survived" in done.stdout

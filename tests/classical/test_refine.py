@@ -1,0 +1,78 @@
+# SPDX-License-Identifier: MIT
+"""ICP, GICP and KISS-ICP from a start that is nearly right, and from starts that are not."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import hybridreg as hr
+from hybridreg import se3
+from hybridreg.classical.icp import plane_step, point_step
+from hybridreg.matches import Pose
+from hybridreg.scene import Scene
+
+STAGES = [hr.Icp(), hr.Icp(kind="plane"), hr.Gicp(), hr.KissIcp()]
+START = se3.from_rt(se3.rotation_about(np.array([0.01, -0.01, 0.03])), np.array([0.25, -0.2, 0.1]))
+
+
+def errors(T: np.ndarray, truth: np.ndarray) -> tuple[float, float]:
+    return se3.angle_deg((se3.inverse(truth) @ T)[:3, :3]), float(np.linalg.norm(T[:3, 3] - truth[:3, 3]))
+
+
+@pytest.mark.parametrize("stage", STAGES, ids=repr)
+def test_comes_closer(stage: Any, courtyard_scene: tuple[Scene, np.ndarray]) -> None:
+    scene, truth = courtyard_scene
+    degrees, metres = errors(stage(scene, Pose(START @ truth)).T, truth)
+    assert degrees < 0.4, degrees
+    assert metres < 0.08, metres
+
+
+@pytest.mark.parametrize("stage", STAGES, ids=repr)
+def test_far_start_ends_in_a_proper_pose(stage: Any, courtyard_scene: tuple[Scene, np.ndarray]) -> None:
+    scene, _ = courtyard_scene
+    away = se3.from_rt(np.eye(3), np.array([500.0, 0.0, 0.0]))
+    se3.check(stage(scene, Pose(away)).T)
+
+
+@pytest.mark.parametrize("stage", STAGES, ids=repr)
+def test_keeps_inliers_and_rivals(stage: Any, courtyard_scene: tuple[Scene, np.ndarray]) -> None:
+    scene, truth = courtyard_scene
+    rivals = np.stack([np.eye(4), se3.yaw(180)])
+    out = stage(scene, Pose(truth, np.ones(3, dtype=bool), rivals))
+    assert np.array_equal(out.rivals, rivals)
+    assert out.inliers is not None
+    assert out.inliers.sum() == 3
+
+
+def test_point_step_is_exact_for_a_rigid_motion() -> None:
+    rng = np.random.default_rng(0)
+    p = rng.normal(size=(40, 3))
+    q = se3.apply(START, p)
+    assert np.allclose(se3.exp(point_step(p, q)), START, atol=1e-9)
+
+
+def test_plane_step_converges_and_leaves_an_open_direction_alone() -> None:
+    rng = np.random.default_rng(0)
+    p = np.column_stack([rng.uniform(-5, 5, (200, 2)), np.zeros(200)])
+    up = np.tile([0.0, 0.0, 1.0], (200, 1))
+    twist = plane_step(p + [0.3, 0.2, 0.5], p, up)
+    assert twist[5] == pytest.approx(-0.5, abs=1e-9)
+    assert np.allclose(twist[[2, 3, 4]], 0.0, atol=1e-9), "nothing holds a plane's yaw, x and y"
+
+
+def test_icp_refuses_an_unknown_kind() -> None:
+    with pytest.raises(ValueError, match="'point' or 'plane'"):
+        hr.Icp(kind="line")  # type: ignore[arg-type]
+
+
+def test_gicp_keeps_the_start_rather_than_lose_overlap(courtyard_scene: tuple[Scene, np.ndarray]) -> None:
+    scene, truth = courtyard_scene
+    from hybridreg.classical.gicp import not_worse
+
+    slid = se3.from_rt(np.eye(3), np.array([3.0, 0.0, 0.0])) @ truth
+    assert np.array_equal(not_worse(scene, Pose(truth), slid).T, truth)
+    assert np.array_equal(not_worse(scene, Pose(slid), truth).T, truth)
+    assert np.array_equal(not_worse(scene, Pose(truth), np.full((4, 4), np.nan)).T, truth)

@@ -1,0 +1,184 @@
+# SPDX-License-Identifier: MIT
+from __future__ import annotations
+
+import json
+import pickle
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from eval_stubs import Moody, RowByRow, Scattered
+
+from hybridreg import se3
+from hybridreg.eval import metrics, predict, protocol, read, score
+from hybridreg.eval.store import differences
+from hybridreg.frames import lower_pose
+from hybridreg.pair import Pair
+
+KITTI = protocol("kitti")
+
+
+def test_rows_hold_the_truth_and_all_that_scoring_needs(tmp_path: Path) -> None:
+    pairs = Scattered()
+    rows = predict(RowByRow(slip=3.0), pairs, tmp_path / "p.jsonl", seed=5)
+    assert [row.id for row in rows] == list(pairs.ids)
+    for row, labelled in zip(rows, pairs, strict=True):
+        assert np.allclose(row.T_true, labelled.T_target_source)
+        assert metrics.rte_m(np.array(row.T), labelled.T_target_source) == pytest.approx(3.0)
+        assert metrics.rte_m(np.array(row.T_estimated), labelled.T_target_source) < 1e-9
+        assert row.n_matches == 200
+        assert row.inlier_ratio is not None
+        assert row.inlier_ratio["1"] == 1.0
+        assert row.n_points == {"source": 400, "target": 200, "source_level": 400, "target_level": 200}
+        assert row.mask == pytest.approx({"precision": 1.0, "recall": 1.0, "f1": 1.0, "iou": 1.0}, abs=0.25)
+        assert row.overlap == pytest.approx(0.5, abs=0.05)
+        assert (row.verdict, row.reasons) == ("ok", ["rows agree"])
+        assert row.evidence["fitness"] == 0.5
+        assert row.evidence["violations"] is None
+        assert set(row.seconds) == {"match", "estimate", "total"}
+    s = score(rows, KITTI)
+    assert (s.recall, s.recall_estimated, s.inlier_ratio) == (0.0, 1.0, 1.0)
+
+
+def test_what_is_read_back_is_what_was_returned(tmp_path: Path) -> None:
+    for method in (Moody(), RowByRow()):
+        rows = predict(method, Scattered(5), tmp_path / f"{type(method).__name__}.jsonl")
+        assert read(tmp_path / f"{type(method).__name__}.jsonl").rows == rows
+
+
+def test_every_failure_is_a_row(tmp_path: Path) -> None:
+    rows = predict(Moody(), Scattered(6, broken=(5,)), tmp_path / "p.jsonl")
+    right, raised, none, nan, wrong, lost = rows
+    assert right.T is not None
+    assert wrong.T == np.eye(4).tolist()
+    assert raised.error == "RuntimeError: pair-1 is beyond me"
+    assert (none.T, none.error, nan.T, nan.error) == (None, None, None, None)
+    assert raised.T_true is not None
+    assert lost.error == "OSError: pair-5: the disk is gone"
+    assert lost.T_true is None
+    s = score(rows, KITTI)
+    assert (s.n, s.n_failed, s.recall) == (6, 4, pytest.approx(1 / 6))
+
+
+def test_a_pose_that_was_not_found_is_none_not_the_identity(tmp_path: Path) -> None:
+    rows = predict(RowByRow(found=False), Scattered(2), tmp_path / "p.jsonl")
+    assert all(row.T is None and row.T_estimated is None for row in rows)
+
+
+def test_stops_and_goes_on_without_doing_a_pair_twice(tmp_path: Path) -> None:
+    log, path = tmp_path / "log", tmp_path / "p.jsonl"
+    method = Moody(moods=("right",), log=str(log))
+
+    def stop_after_two(row: Any) -> None:
+        if row.index == 1:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        predict(method, Scattered(5), path, on_row=stop_after_two)
+    assert len(read(path).rows) == 2
+    rows = predict(method, Scattered(5), path)
+    assert [row.id for row in rows] == [f"pair-{i}" for i in range(5)]
+    assert [line.split()[0] for line in log.read_text().splitlines()] == [f"pair-{i}" for i in range(5)]
+
+
+@pytest.mark.parametrize("cut", [1, 40, 300])
+def test_half_a_last_line_is_ignored_and_written_again(tmp_path: Path, cut: int) -> None:
+    path = tmp_path / "p.jsonl"
+    whole = predict(RowByRow(), Scattered(3), path)
+    path.write_bytes(path.read_bytes()[:-cut])
+    assert len(read(path).rows) == 2
+    again = predict(RowByRow(), Scattered(3), path)
+    assert [row.timeless for row in again] == [row.timeless for row in whole]
+    assert len(path.read_text().splitlines()) == 4
+    assert all(json.loads(line) for line in path.read_text().splitlines())
+
+
+def test_half_a_header_is_begun_anew(tmp_path: Path) -> None:
+    path = tmp_path / "p.jsonl"
+    predict(RowByRow(), Scattered(2), path)
+    path.write_bytes(path.read_bytes()[:25])
+    assert len(predict(RowByRow(), Scattered(2), path)) == 2
+
+
+@pytest.mark.parametrize("content", ["my notes", "my notes\n", '{"a": 1}\n', "\x80"])
+def test_another_kind_of_file_is_left_alone(tmp_path: Path, content: str) -> None:
+    path = tmp_path / "notes.txt"
+    path.write_bytes(content.encode("latin-1"))
+    with pytest.raises(ValueError, match="not a file of predictions"):
+        predict(RowByRow(), Scattered(2), path)
+    assert path.read_bytes() == content.encode("latin-1")
+
+
+def test_a_broken_line_in_the_middle_is_named(tmp_path: Path) -> None:
+    path = tmp_path / "p.jsonl"
+    predict(RowByRow(), Scattered(3), path)
+    lines = path.read_text().splitlines(keepends=True)
+    path.write_text("".join([*lines[:2], '{"index": 1, "colour": "red"}\n', *lines[3:]]))
+    with pytest.raises(ValueError, match="line 3.*colour"):
+        read(path)
+
+
+@pytest.mark.parametrize(
+    ("change", "told"),
+    [
+        ({"method": RowByRow(slip=0.5)}, "method.estimate.slip: 0.0 before, 0.5 now"),
+        ({"seed": 1}, "seed: 0 before, 1 now"),
+        ({"pairs": Scattered(3)}, "data.pairs: 2 before, 3 now"),
+        ({"data": "other"}, 'data.name: "" before, "other" now'),
+    ],
+)
+def test_a_changed_configuration_is_refused_and_named(tmp_path: Path, change: dict[str, Any], told: str) -> None:
+    path = tmp_path / "p.jsonl"
+    first = {"method": RowByRow(), "pairs": Scattered(2), "seed": 0, "data": ""}
+
+    def run(overwrite: bool = False, **given: Any) -> list[Any]:
+        return predict(given.pop("method"), given.pop("pairs"), path, overwrite=overwrite, **given)
+
+    run(**first)
+    before = path.read_bytes()
+    with pytest.raises(ValueError, match="--overwrite") as refused:
+        run(**{**first, **change})
+    assert told in str(refused.value)
+    assert path.read_bytes() == before
+    run(overwrite=True, **{**first, **change})
+    run(**{**first, **change})
+
+
+def test_differences_name_every_leaf() -> None:
+    old, new = {"a": {"b": 1, "c": [1]}, "d": 2}, {"a": {"b": 1, "c": [2]}, "e": "x"}
+    assert list(differences(old, new)) == [
+        "a.c: [1] before, [2] now", "d: 2 before, unset now", 'e: unset before, "x" now',
+    ]  # fmt: skip
+
+
+class Peeking:
+    """Keeps everything it is handed."""
+
+    def __init__(self) -> None:
+        self.seen: list[Pair] = []
+
+    def __call__(self, pair: Pair, seed: int) -> np.ndarray:
+        self.seen.append(pair)
+        return np.eye(4)
+
+
+def test_no_truth_reaches_the_method(tmp_path: Path) -> None:
+    spy = Peeking()
+    predict(spy, Scattered(2), tmp_path / "p.jsonl")
+    truths = [labelled.T_target_source for labelled in Scattered(2)]
+    for pair, T in zip(spy.seen, truths, strict=True):
+        assert not hasattr(pair, "T_target_source")
+        stored = pickle.dumps(pair)
+        assert not any(np.ascontiguousarray(part).tobytes() in stored for part in (T, T[:3, :3], T[:3, 3]))
+
+
+def test_map_coordinates_do_not_blow_up_the_errors(tmp_path: Path) -> None:
+    far = Scattered(2, offset=5e6)
+    rows = predict(RowByRow(slip=0.25), far, tmp_path / "p.jsonl")
+    for row, labelled in zip(rows, far, strict=True):
+        assert row.offsets is not None
+        assert metrics.rte_m(np.array(row.T), np.array(row.T_true)) == pytest.approx(0.25, abs=1e-5)
+        assert np.allclose(row.T_true, lower_pose(labelled.T_target_source, labelled.pair), atol=1e-6)
+    moved = se3.inverse(np.array(rows[0].T_true)) @ np.array(rows[0].T)
+    assert se3.angle_deg(moved[:3, :3]) < 1e-5

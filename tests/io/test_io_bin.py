@@ -1,0 +1,93 @@
+# SPDX-License-Identifier: MIT
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from hybridreg.io import read_points
+from hybridreg.io.bin import parse_bin
+
+
+def rows(n, width, seed=0):
+    rng = np.random.default_rng(seed)
+    table = rng.uniform(-60, 60, size=(n, width))
+    table[:, 3] = rng.uniform(0, 1, size=n)
+    if width == 5:
+        table[:, 4] = rng.integers(0, 32, size=n)
+    return table.astype("<f4")
+
+
+@pytest.mark.parametrize("name", ["000000.bin", "sweep.pcd.bin", "SWEEP.PCD.BIN"])
+@pytest.mark.parametrize("width", [4, 5])
+@pytest.mark.parametrize("n", [41, 43, 60, 100, 400])
+def test_values_decide_where_size_and_name_mislead(n, width, name):
+    table = rows(n, width)
+    np.testing.assert_array_equal(parse_bin(table.tobytes(), name), table[:, :3])
+
+
+def test_reflectivities_beyond_a_byte_and_a_constant_minus_one():
+    for value in (40000.0, -1.0):
+        table = rows(41, 4)
+        table[:, 3] = value
+        np.testing.assert_array_equal(parse_bin(table.tobytes(), "a.bin"), table[:, :3])
+
+
+@pytest.mark.parametrize("name, columns", [("a.bin", 4), ("a.pcd.bin", 5)])
+def test_name_decides_where_the_values_fit_neither(name, columns):
+    table = np.full((20, 4), -1.0, "<f4")
+    assert parse_bin(table.tobytes(), name).shape == (320 // (4 * columns), 3)
+
+
+def test_values_that_fit_both_are_refused_with_the_reason():
+    with pytest.raises(
+        ValueError, match=r"320 bytes are 20 rows of four numbers or 16 of five, and both.*npy"
+    ):
+        parse_bin(bytes(320), "a.bin")
+
+
+def test_cut_file_names_its_size():
+    with pytest.raises(ValueError, match=r"a\.bin: its 641 bytes are no multiple of 16.*nor of 20"):
+        parse_bin(rows(41, 4).tobytes()[:641], "a.bin")
+
+
+@pytest.mark.parametrize("width, cut", [(4, 60 * 16 - 20), (5, 60 * 20 - 16), (4, 860)])
+def test_file_cut_to_a_size_of_the_other_layout_is_refused(width, cut):
+    with pytest.raises(ValueError, match=r"another layout|no multiple"):
+        parse_bin(rows(60, width).tobytes()[:cut], "a.bin")
+
+
+def test_three_columns_are_refused():
+    table = rows(40, 4)[:, [0, 1, 2]]
+    with pytest.raises(ValueError, match=r"intensities are negative.*another layout"):
+        parse_bin(table.tobytes(), "a.bin")
+
+
+def test_float64_rows_are_refused():
+    with pytest.raises(ValueError, match="another layout"):
+        parse_bin(rows(41, 4).astype("<f8").tobytes(), "a.bin")
+
+
+def test_noise_is_refused():
+    noise = np.random.default_rng(0).bytes(16 * 101)
+    with pytest.raises(ValueError, match=r"% of the points lie beyond 1e\+07 m"):
+        parse_bin(noise, "a.bin")
+
+
+def test_missing_returns_are_kept():
+    table = rows(41, 4)
+    table[::2, :3] = np.nan
+    table[1, 0] = np.inf
+    np.testing.assert_array_equal(parse_bin(table.tobytes(), "a.bin"), table[:, :3])
+
+
+def test_real_sweep(real_data, tmp_path):
+    with np.load(real_data / "kitti-odo-5-to-0" / "source.npz") as archive:
+        xyz, intensity = archive["xyz"], archive["intensity"]
+    four = np.hstack([xyz, intensity[:, None]]).astype("<f4")
+    five = np.hstack([four, np.arange(len(xyz))[:, None] % 64]).astype("<f4")
+    # A multiple of 20 points, so that both sizes fit and the values must decide.
+    keep = len(xyz) // 20 * 20
+    for name, table in (("a.bin", four), ("b.pcd.bin", five), ("c.bin", five), ("d.pcd.bin", four)):
+        for count in (len(xyz), keep):
+            (tmp_path / name).write_bytes(table[:count].tobytes())
+            np.testing.assert_array_equal(read_points(tmp_path / name), xyz[:count])

@@ -1,0 +1,177 @@
+# SPDX-License-Identifier: MIT
+from __future__ import annotations
+
+import struct
+
+import cv2
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as hnp
+
+from hybridreg.io import as_image, read_image
+
+
+@pytest.fixture(scope="module")
+def rgb():
+    return np.random.default_rng(0).integers(0, 256, size=(24, 32, 3), dtype=np.uint8)
+
+
+def encoded(pixels, ending=".png"):
+    """`pixels` in RGB(A) order as a file's bytes."""
+    order = {3: [2, 1, 0], 4: [2, 1, 0, 3]}.get(pixels.shape[2] if pixels.ndim == 3 else 0)
+    done, data = cv2.imencode(ending, pixels[..., order] if order else pixels)
+    assert done
+    return data.tobytes()
+
+
+@pytest.fixture
+def read(tmp_path):
+    def write_and_read(data, name="photo.png"):
+        (tmp_path / name).write_bytes(data)
+        return read_image(tmp_path / name)
+
+    return write_and_read
+
+
+@pytest.mark.parametrize("ending", [".png", ".bmp", ".tiff"])
+def test_colour_is_rgb(read, rgb, ending):
+    image = read(encoded(rgb, ending), f"photo{ending}")
+    assert image.dtype == np.uint8
+    assert image.flags.c_contiguous
+    assert image.flags.writeable
+    np.testing.assert_array_equal(image, rgb)
+
+
+def test_grey_is_three_equal_channels(read, rgb):
+    np.testing.assert_array_equal(read(encoded(rgb[..., 0])), np.stack([rgb[..., 0]] * 3, axis=-1))
+
+
+def test_alpha_is_dropped(read, rgb):
+    with_alpha = np.dstack([rgb, np.arange(24 * 32, dtype=np.uint8).reshape(24, 32)])
+    np.testing.assert_array_equal(read(encoded(with_alpha)), rgb)
+
+
+@pytest.mark.parametrize("grey", [False, True])
+def test_sixteen_bits_are_rounded_to_eight(read, rgb, grey):
+    deep = rgb.astype(np.uint16) * 257
+    deep = deep[..., 0] if grey else deep
+    expected = np.stack([rgb[..., 0]] * 3, axis=-1) if grey else rgb
+    np.testing.assert_array_equal(read(encoded(deep)), expected)
+    between = np.clip(deep, 200, 65335) + 100
+    rounded = np.rint(between * (255 / 65535)).reshape(24, 32, -1)
+    np.testing.assert_array_equal(read(encoded(between)), np.broadcast_to(rounded, (24, 32, 3)))
+
+
+def jpeg_with_orientation(pixels, orientation):
+    tags = struct.pack("<2sHIHHHIHHI", b"II", 42, 8, 1, 0x0112, 3, 1, orientation, 0, 0)
+    segment = b"\xff\xe1" + struct.pack(">H", len(tags) + 8) + b"Exif\0\0" + tags
+    data = encoded(pixels, ".jpg")
+    return data[:2] + segment + data[2:]
+
+
+def test_exif_orientation_is_applied(read, rgb):
+    upright = read(jpeg_with_orientation(rgb, 1), "a.jpg")
+    turned = read(jpeg_with_orientation(rgb, 6), "b.jpg")
+    assert upright.shape == (24, 32, 3)
+    assert turned.shape == (32, 24, 3)
+    np.testing.assert_array_equal(turned, np.rot90(upright, -1))
+
+
+@pytest.mark.parametrize("ending", [".jpg", ".png", ".bmp", ".webp", ".tiff"])
+@pytest.mark.parametrize("kept", [0.05, 0.5, 0.98])
+def test_truncated_image(read, ending, kept):
+    picture = np.random.default_rng(1).integers(0, 256, size=(200, 300, 3), dtype=np.uint8)
+    data = encoded(picture, ending)
+    with pytest.raises(ValueError, match=rf"photo\{ending}.*bytes"):
+        read(data[: int(len(data) * kept)], f"photo{ending}")
+
+
+def test_cut_jpeg_is_refused_also_where_a_thumbnail_has_an_end_mark(read, rgb):
+    thumbnail = encoded(rgb[:8, :8], ".jpg")
+    segment = b"\xff\xe1" + struct.pack(">H", len(thumbnail) + 8) + b"Exif\0\0" + thumbnail
+    data = encoded(rgb, ".jpg")
+    whole = data[:2] + segment + data[2:]
+    assert read(whole + b"\0\0trailer").shape == rgb.shape
+    with pytest.raises(ValueError, match="breaks off within the JPEG"):
+        read(whole[:-40])
+
+
+@pytest.mark.parametrize(
+    "data, message",
+    [
+        (b"", "0 bytes"),
+        (b"\xff\xd8\xff", "breaks off"),
+        (b"<html><body>404", "web page"),
+        (b"version https://git-lfs.github.com/spec/v1\n", "Git LFS pointer"),
+        (b"ply\nformat ascii 1.0\n", "a PLY file"),
+        (bytes(1000), r"begins with b'\\x00.*1000 bytes"),
+    ],
+)
+def test_files_that_are_no_image(read, data, message):
+    with pytest.raises(ValueError, match=rf"photo\.png: .*{message}"):
+        read(data)
+
+
+def test_missing_image_and_folder(tmp_path):
+    with pytest.raises(FileNotFoundError, match=r"photo\.png: no such file"):
+        read_image(tmp_path / "photo.png")
+    with pytest.raises(IsADirectoryError, match="folder"):
+        read_image(tmp_path)
+
+
+def test_real_photograph(real_data):
+    path = next(iter(sorted(real_data.glob("*/image.jpg"))))
+    image = read_image(path)
+    # OpenCV's own reader is the measure here; it gives BGR.
+    np.testing.assert_array_equal(image, cv2.imread(str(path))[..., ::-1])
+
+
+images = st.sampled_from([(), (1,), (3,), (4,)]).flatmap(
+    lambda channels: hnp.arrays(
+        np.uint8, hnp.array_shapes(min_dims=2, max_dims=2).map(lambda s: s + channels)
+    )
+)
+
+
+@settings(max_examples=50, deadline=None)
+@given(images)
+def test_all_types_of_one_image_agree(pixels):
+    image = as_image(pixels)
+    assert image.shape == (*pixels.shape[:2], 3)
+    colour = pixels[:, :, None] if pixels.ndim == 2 else pixels[:, :, :3]
+    np.testing.assert_array_equal(image, np.broadcast_to(colour, image.shape))
+    np.testing.assert_array_equal(as_image(pixels.astype(np.uint16) * 257), image)
+    np.testing.assert_array_equal(as_image(pixels.astype(">u2") * 257), image)
+    np.testing.assert_array_equal(as_image(pixels / 255.0), image)
+    np.testing.assert_array_equal(as_image((pixels / 255.0).astype(np.float32)), image)
+    np.testing.assert_array_equal(as_image(image), image)
+
+
+def test_result_is_a_copy(rgb):
+    image = as_image(rgb)
+    image[:] = 0
+    assert rgb.any()
+
+
+@pytest.mark.parametrize(
+    "pixels, message",
+    [
+        (np.zeros(10, np.uint8), r"shape \(10,\)"),
+        (np.zeros((4, 5, 2), np.uint8), r"shape \(4, 5, 2\); give \(H, W\)"),
+        (np.zeros((3, 40, 50), np.uint8), r"shape \(3, 40, 50\), channels first.*moveaxis"),
+        (np.zeros((2, 40, 50, 3), np.uint8), r"shape \(2, 40, 50, 3\)"),
+        (np.zeros((0, 5, 3), np.uint8), "no pixels"),
+        (np.zeros((4, 5), np.int64), "dtype int64.*uint8"),
+        (np.zeros((4, 5), bool), "dtype bool"),
+        (np.full((4, 5), "a"), "dtype <U1"),
+        (np.full((4, 5), 200.0), "from 200 to 200, not in"),
+        (np.full((4, 5), -0.5), "from -0.5"),
+        (np.full((4, 5), np.nan), "from nan to nan"),
+        (None, "shape"),
+    ],
+)
+def test_arrays_that_are_no_image(pixels, message):
+    with pytest.raises(ValueError, match=rf"front camera: .*{message}"):
+        as_image(pixels, "front camera")

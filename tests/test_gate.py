@@ -1,0 +1,153 @@
+# SPDX-License-Identifier: MIT
+"""What the entrance takes, and how it refuses the rest."""
+
+from __future__ import annotations
+
+import pickle
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import array_shapes, arrays
+
+from hybridreg import PointCloud
+
+GOOD = np.random.default_rng(0).uniform(-10, 10, (50, 3))
+
+
+def with_row(value: Any) -> np.ndarray:
+    bad = GOOD.copy()
+    bad[17, 1] = value
+    return bad
+
+
+@pytest.mark.parametrize(
+    "x, words",
+    [
+        (np.zeros((0, 3)), "empty"),
+        (np.zeros(0), "empty"),
+        ([], "empty"),
+        (GOOD[:19], "19 points are too few.*at least 20"),
+        (GOOD[:1], "1 points are too few"),
+        (with_row(np.nan), "1 of 50 points are not finite.*row 17.*nonfinite"),
+        (with_row(np.inf), "1 of 50 points are not finite"),
+        (np.ones((50, 3)), "all 50 points lie in one place"),
+        (np.full((50, 3), 1e6), "one place"),
+        (np.outer(np.arange(50), [1.0, 2.0, 3.0]), "on one line"),
+        (GOOD.T, r"shape \(N, 3\), got \(3, 50\); transpose"),
+        (GOOD[:, :2], r"got \(50, 2\)"),
+        (GOOD[None], r"got \(1, 50, 3\)"),
+        (GOOD.astype(str), "dtype"),
+        (GOOD.astype(complex), "dtype complex128"),
+        (GOOD > 0, "dtype bool"),
+        (np.array([None] * 60).reshape(20, 3), "dtype object"),
+        ([[1, 2, 3], [4, 5]], "cannot read"),
+        (with_row(1e12), "1e.12 m cannot be real"),
+        (None, "dtype object"),
+        (3.0, "shape"),
+    ],
+)
+def test_refuses(x: Any, words: str) -> None:
+    with pytest.raises(ValueError, match=words) as caught:
+        PointCloud.of(x, name="target")
+    assert str(caught.value).startswith("target: "), "the message names the cloud"
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
+def test_drops_nonfinite_points_only_when_asked(value: float) -> None:
+    cloud = PointCloud.of(with_row(value), nonfinite="drop")
+    assert len(cloud) == 49
+    assert cloud.dropped == 1
+
+
+def test_dropping_everything_is_an_empty_cloud() -> None:
+    with pytest.raises(ValueError, match="empty"):
+        PointCloud.of(np.full((50, 3), np.nan), nonfinite="drop")
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float16, np.int32, np.uint8])
+def test_takes_any_number(dtype: type) -> None:
+    array = (GOOD + 11).astype(dtype)
+    assert np.array_equal(PointCloud.of(array).points, array.astype(np.float64))
+
+
+def test_takes_lists_and_more_columns() -> None:
+    assert np.array_equal(PointCloud.of(GOOD.tolist()).points, GOOD)
+    assert np.array_equal(PointCloud.of(np.hstack([GOOD, GOOD])).points, GOOD)
+
+
+def test_takes_a_torch_tensor() -> None:
+    torch = pytest.importorskip("torch")
+    assert np.array_equal(PointCloud.of(torch.tensor(GOOD, requires_grad=True)).points, GOOD)
+
+
+def test_takes_open3d_clouds() -> None:
+    from hybridreg._open3d import load_open3d
+
+    o3d = load_open3d()
+    legacy = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(GOOD))
+    assert np.array_equal(PointCloud.of(legacy).points, GOOD)
+    tensor = o3d.t.geometry.PointCloud(o3d.core.Tensor(GOOD))
+    assert np.array_equal(PointCloud.of(tensor).points, GOOD)
+    for empty in (o3d.geometry.PointCloud(), o3d.t.geometry.PointCloud()):
+        with pytest.raises(ValueError, match="empty"):
+            PointCloud.of(empty)
+
+
+def test_takes_whatever_has_points() -> None:
+    assert np.array_equal(PointCloud.of(SimpleNamespace(points=GOOD)).points, GOOD)
+
+
+def test_the_caller_keeps_its_array() -> None:
+    mine = GOOD.copy()
+    cloud = PointCloud.of(mine)
+    mine[:] = 0
+    assert np.array_equal(cloud.points, GOOD)
+    with pytest.raises(ValueError, match="read-only"):
+        cloud.points[0] = 0
+
+
+@given(
+    arrays(
+        st.sampled_from([np.float64, np.float32, np.int16]),
+        array_shapes(min_dims=1, max_dims=3, max_side=40),
+    )
+)
+@settings(max_examples=200, deadline=None)
+def test_any_array_is_taken_or_refused_in_words(x: np.ndarray) -> None:
+    try:
+        cloud = PointCloud.of(x, name="source")
+    except ValueError as error:
+        assert str(error).startswith("source: ")
+    else:
+        assert np.isfinite(cloud.points).all()
+        assert len(cloud) >= 20
+
+
+@given(st.integers(0, 2**32 - 1), st.floats(1e-6, 1e6))
+@settings(max_examples=50, deadline=None)
+def test_a_spread_cloud_of_any_size_passes(seed: int, scale: float) -> None:
+    points = np.random.default_rng(seed).normal(size=(30, 3)) * scale
+    assert len(PointCloud.of(points)) == 30
+
+
+def test_offset_comes_off_in_whole_kilometres() -> None:
+    shift = np.array([5e6, -4e5, 2e4])
+    cloud = PointCloud.of(GOOD + shift)
+    assert np.array_equal(cloud.offset, shift)
+    assert np.allclose(cloud.points, GOOD, atol=1e-8)
+    assert np.array_equal(PointCloud.of(GOOD + 900.0).offset, np.zeros(3)), "900 m is no map grid"
+
+
+def test_viewpoint_is_the_origin_where_the_sensor_may_have_stood() -> None:
+    assert np.array_equal(PointCloud.of(GOOD).viewpoint, np.zeros(3))
+    assert PointCloud.of(GOOD + 500.0).viewpoint is None
+
+
+def test_pickles() -> None:
+    cloud = pickle.loads(pickle.dumps(PointCloud.of(GOOD, sensor="fan")))
+    assert cloud.sensor == "fan"
+    assert np.array_equal(cloud.points, GOOD)

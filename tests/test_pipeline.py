@@ -1,0 +1,255 @@
+# SPDX-License-Identifier: MIT
+from __future__ import annotations
+
+import dataclasses
+import pickle
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import hybridreg as hr
+from hybridreg import se3, testing
+from hybridreg.matches import Correspondences, Overlap, Pose
+from hybridreg.scene import Scene
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrueMatches:
+    """A third party's matcher that imports nothing of ours but the types it returns."""
+
+    n: int = 100
+    gives = frozenset({"matches"})
+
+    def __call__(self, scene: Scene, overlap: Overlap) -> Correspondences:
+        return testing.true_matches(scene, testing.sample_scene()[1], n=self.n)
+
+
+class Prophet:
+    """A stage that notes what it was given."""
+
+    def __init__(self) -> None:
+        self.seen: list[Any] = []
+
+    def __call__(self, scene: Scene, matches: Correspondences, rng: np.random.Generator) -> Pose:
+        self.seen.append((len(scene.source), len(matches), rng.integers(1 << 30)))
+        return Pose(np.eye(4))
+
+
+def identity(**stages: Any) -> hr.Pipeline:
+    return hr.Pipeline(**{"match": "none", "estimate": "identity", "refine": "none", **stages})
+
+
+def test_aligns_the_courtyard(courtyard: tuple[hr.Pair, np.ndarray]) -> None:
+    pair, truth = courtyard
+    result = hr.Pipeline(voxel=0.4, match=TrueMatches()).run(pair)
+    error = se3.inverse(truth) @ result.transformation
+    assert se3.angle_deg(error[:3, :3]) < 0.3
+    assert np.linalg.norm(result.transformation[:3, 3] - truth[:3, 3]) < 0.05
+    assert result.T_target_source is result.transformation
+    assert set(result.seconds) == {"downsample", "overlap", "match", "estimate", "refine", "verdict"}
+    assert result.spec["match"]["stage"].endswith(":TrueMatches")
+
+
+def test_call_takes_what_run_takes(courtyard: tuple[hr.Pair, np.ndarray]) -> None:
+    pair, _ = courtyard
+    result = identity(voxel=0.5)(pair.source.points, pair.target.points.tolist())
+    assert np.array_equal(result.transformation, np.eye(4))
+
+
+def test_rotation_is_made_proper(courtyard: tuple[hr.Pair, np.ndarray]) -> None:
+    drifted = se3.yaw(30.0).astype(np.float32) * np.float32(1.001)
+
+    def estimate(scene: Scene, matches: Correspondences, rng: np.random.Generator) -> Pose:
+        return Pose(drifted)  # type: ignore[arg-type]
+
+    T = identity(estimate=estimate, voxel=0.5).run(courtyard[0]).transformation
+    assert np.allclose(T[:3, :3] @ T[:3, :3].T, np.eye(3), atol=1e-12)
+    assert np.linalg.det(T[:3, :3]) == pytest.approx(1.0)
+    assert T.dtype == np.float64
+
+
+@pytest.mark.parametrize("bad", [np.full((4, 4), np.nan), np.eye(3)])
+def test_a_pose_that_is_none_is_a_failure_not_a_crash(courtyard: tuple[hr.Pair, np.ndarray], bad: np.ndarray) -> None:
+    result = identity(estimate=lambda scene, matches, rng: Pose(bad), voxel=0.5).run(courtyard[0])
+    assert result.verdict == "failed"
+    assert np.array_equal(result.transformation, np.eye(4))
+
+
+def test_random_numbers_depend_on_seed_and_pair_alone(courtyard: tuple[hr.Pair, np.ndarray]) -> None:
+    pair, prophet = courtyard[0], Prophet()
+    pipe = identity(estimate=prophet, voxel=0.5)
+    other = dataclasses.replace(pair, id="another")
+    for seed, p in ((0, pair), (0, other), (0, pair), (1, pair)):
+        pipe.trace(p, seed=seed)
+    draws = [seen[2] for seen in prophet.seen]
+    assert draws[0] == draws[2]
+    assert len({draws[0], draws[1], draws[3]}) == 3
+
+
+def test_swap_changes_one_slot_and_only_that() -> None:
+    pipe = hr.Pipeline(voxel=0.3)
+    swapped = pipe.swap(refine="none")
+    assert type(swapped.refine).__name__ == "NoRefinement"
+    assert type(pipe.refine).__name__ == "Gicp"
+    assert swapped.match is pipe.match
+    assert pipe.swap(voxel=0.5).downsample.voxel == 0.5
+    assert pipe.swap(downsample=hr.VoxelGrid(voxel=1.0)).downsample.voxel == 1.0
+    with pytest.raises(TypeError, match="estimator"):
+        pipe.swap(estimator="svd")
+
+
+def test_mistyped_keyword_is_refused_at_once() -> None:
+    with pytest.raises(TypeError, match="voxle"):
+        hr.VoxelGrid(voxle=0.3)  # type: ignore[call-arg]
+    with pytest.raises(ValueError, match="radious.*its fields are"):
+        hr.Pipeline(match={"stage": "fpfh", "radious": 1.0})
+
+
+def test_misfit_is_refused_when_built_and_names_what_would_fit() -> None:
+    with pytest.raises(ValueError, match=r"Ransac.*needs 'matches'.*NoMatch.*fpfh.*kiss"):
+        hr.Pipeline(match="none", estimate="ransac")
+    with pytest.raises(ValueError, match="no stage"):
+        hr.Pipeline(refine=3)
+
+
+def test_unknown_names_list_the_known_ones() -> None:
+    with pytest.raises(KeyError, match="did you mean 'ransac'"):
+        hr.Pipeline(estimate="ransak")
+    with pytest.raises(KeyError, match=r"kiss-gicp"):
+        hr.Pipeline.preset("no-such")
+
+
+def test_voxel_shorthand() -> None:
+    assert hr.Pipeline(voxel=0.3).downsample == hr.VoxelGrid(voxel=0.3)
+    with pytest.raises(ValueError, match="contradicts"):
+        hr.Pipeline(voxel=0.3, downsample=hr.VoxelGrid(voxel=0.4))
+    with pytest.raises(ValueError, match="no voxel"):
+        hr.Pipeline(voxel=0.3, downsample="random")
+    with pytest.raises(ValueError, match="positive"):
+        hr.Pipeline(voxel=-1.0)
+
+
+def test_own_matches_replace_the_match_stage(courtyard: tuple[hr.Pair, np.ndarray]) -> None:
+    pair, truth = courtyard
+    source = pair.source.points[::50]
+    own = hr.Correspondences.of(source, se3.apply(truth, source))
+    pipe = hr.Pipeline(match="given", estimate="svd", refine="none", voxel=0.4)
+    result = pipe.run(pair, matches=own)
+    assert np.allclose(result.transformation, truth, atol=1e-9)
+    with pytest.raises(ValueError, match="own matches"):
+        pipe.run(pair)
+
+
+def test_own_matches_as_rows(courtyard: tuple[hr.Pair, np.ndarray]) -> None:
+    pair, _ = courtyard
+    pipe = identity(voxel=0.5)
+    rows = np.array([[0, 5], [7, 3]])
+    trace = pipe.trace(pair, matches=rows)
+    assert np.array_equal(trace.matches.source, pair.source.points[[0, 7]])
+    assert np.array_equal(trace.matches.target, pair.target.points[[5, 3]])
+    with pytest.raises(ValueError, match="the target has"):
+        pipe.trace(pair, matches=np.array([[0, len(pair.target)]]))
+    with pytest.raises(ValueError, match="integer rows"):
+        pipe.trace(pair, matches=rows.astype(float))
+
+
+def test_large_coordinates_give_the_same_pose(courtyard: tuple[hr.Pair, np.ndarray]) -> None:
+    pair, _ = courtyard
+    pipe = hr.Pipeline(voxel=0.4, match="none", estimate="identity", refine="icp")
+    plain = pipe.run(pair).transformation
+    shift = np.eye(4)
+    shift[:3, 3] = 5e6
+    moved = pipe(pair.source.points + 5e6, pair.target.points + 5e6).transformation
+    back = se3.inverse(shift) @ moved @ shift
+    # Points of the cloud, not the matrix: at 5e6 m the ninth digit of a rotation is a centimetre.
+    assert np.abs(se3.apply(back, pair.source.points) - se3.apply(plain, pair.source.points)).max() < 1e-3
+
+
+def test_only_one_cloud_on_a_map_grid(courtyard: tuple[hr.Pair, np.ndarray]) -> None:
+    pair, _ = courtyard
+    pipe = identity(voxel=0.5)
+    result = pipe(pair.source.points, pair.target.points + [4e5, 5e6, 0.0])
+    assert np.allclose(result.transformation[:3, 3], [4e5, 5e6, 0.0])
+
+
+def test_image_is_asked_for_where_a_stage_needs_it(courtyard: tuple[hr.Pair, np.ndarray]) -> None:
+    @dataclass(frozen=True)
+    class Sees:
+        needs = frozenset({"image"})
+
+        def __call__(self, scene: Scene) -> Overlap:
+            return Overlap.full(len(scene.source), len(scene.target))
+
+    blind = dataclasses.replace(courtyard[0], image=None)
+    with pytest.raises(ValueError, match="Sees needs an image"):
+        identity(overlap=Sees(), voxel=0.5).run(blind)
+
+
+def test_too_coarse_a_voxel_is_refused_with_the_cure(courtyard: tuple[hr.Pair, np.ndarray]) -> None:
+    with pytest.raises(ValueError, match=r"source: \d+ of \d+ points.*smaller voxel"):
+        identity(voxel=30.0).run(courtyard[0])
+
+
+@pytest.mark.parametrize("scale, unit", [(1000.0, "millimetres"), (1e-3, "kilometres")])
+def test_a_wrong_unit_is_a_warning_with_numbers(
+    courtyard: tuple[hr.Pair, np.ndarray], scale: float, unit: str
+) -> None:
+    pair = courtyard[0]
+    with pytest.warns(UserWarning, match=rf"source: half of the points .*{unit}"):
+        identity()(pair.source.points * scale, pair.target.points * scale)
+
+
+def test_a_degenerate_voxel_count_is_a_warning_with_numbers(courtyard: tuple[hr.Pair, np.ndarray]) -> None:
+    pair = courtyard[0]
+    with pytest.warns(UserWarning, match=r"voxels of 0.001 m along"):
+        identity(voxel=1e-3)(pair.source.points * 100, pair.target.points * 100)
+
+
+def test_save_and_load(tmp_path: Path) -> None:
+    pipe = hr.Pipeline(voxel=0.3, refine=hr.Gicp(max_distances=(2.0, 1.0), iterations=7))
+    pipe.save(tmp_path / "mine.toml")
+    assert hr.Pipeline.load(tmp_path / "mine.toml") == pipe.swap(voxel=None, downsample=pipe.downsample)
+    assert [p.name for p in tmp_path.iterdir()] == ["mine.toml"]
+
+
+@pytest.mark.parametrize(
+    "text, words",
+    [
+        ("match = ", "not a TOML file"),
+        ("matcher = 'fpfh'", "matcher is no slot"),
+        ("match = 3", "expected a stage's name"),
+        ("[match]\nradius = 1.0", "expected a stage's name"),
+        ("[match]\nstage = 'fpfh'\nradious = 1.0", "radious"),
+    ],
+)
+def test_a_wrong_pipeline_file_is_refused_in_words(tmp_path: Path, text: str, words: str) -> None:
+    (tmp_path / "p.toml").write_text(text)
+    with pytest.raises(ValueError, match=words):
+        hr.Pipeline.load(tmp_path / "p.toml")
+
+
+@pytest.mark.parametrize("name", ["os:system", "subprocess.Popen", "match.os:system"])
+def test_a_pipeline_file_cannot_name_a_class(tmp_path: Path, name: str) -> None:
+    (tmp_path / "p.toml").write_text(f"[match]\nstage = {name!r}\n")
+    with pytest.raises(KeyError):
+        hr.Pipeline.load(tmp_path / "p.toml")
+
+
+def test_an_unregistered_stage_is_not_written_to_a_file(tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match="entry-point"):
+        hr.Pipeline(match=TrueMatches()).save(tmp_path / "p.toml")
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("name", ["icp", "fpfh-ransac", "fpfh-ransac-gicp", "fpfh-fgr-gicp", "kiss-gicp"])
+def test_presets_build_pickle_and_clone(name: str) -> None:
+    pipe = hr.Pipeline.preset(name, voxel=0.5)
+    assert pickle.loads(pickle.dumps(pipe)) == pipe
+    assert pipe.downsample.voxel == 0.5
+    sklearn = pytest.importorskip("sklearn.base")
+    assert sklearn.clone(pipe) == pipe
+    assert pipe.get_params()["downsample__voxel"] == 0.5
+    assert pipe.replace(refine__iterations=3).refine.iterations == 3 if "gicp" in name else True

@@ -1,0 +1,93 @@
+# SPDX-License-Identifier: MIT
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from hybridreg import se3
+
+vectors = arrays(np.float64, 3, elements=st.floats(-3.1, 3.1))
+seeds = st.integers(0, 2**32 - 1)
+
+
+def random_motion(seed: int) -> np.ndarray:
+    rng = np.random.default_rng(seed)
+    return se3.from_rt(se3.random_rotation(rng), rng.normal(size=3) * 50)
+
+
+@given(seeds)
+def test_inverse_undoes(seed: int) -> None:
+    T = random_motion(seed)
+    assert np.allclose(se3.inverse(T) @ T, np.eye(4), atol=1e-12)
+
+
+@given(seeds, seeds)
+def test_apply_composes(a: int, b: int) -> None:
+    A, B = random_motion(a), random_motion(b)
+    points = np.random.default_rng(a).normal(size=(7, 3))
+    assert np.allclose(se3.apply(A @ B, points), se3.apply(A, se3.apply(B, points)), atol=1e-9)
+
+
+@given(vectors)
+def test_rotation_is_proper_and_has_the_angle_of_its_vector(vector: np.ndarray) -> None:
+    R = se3.rotation_about(vector)
+    assert np.allclose(R @ R.T, np.eye(3), atol=1e-12)
+    assert np.linalg.det(R) == pytest.approx(1.0)
+    angle = np.degrees(np.linalg.norm(vector)) % 360
+    assert se3.angle_deg(R) == pytest.approx(min(angle, 360 - angle), abs=1e-5)
+
+
+@given(vectors)
+def test_log_rotation_inverts(vector: np.ndarray) -> None:
+    R = se3.rotation_about(vector)
+    assert np.allclose(se3.rotation_about(se3.log_rotation(R)), R, atol=1e-9)
+
+
+@pytest.mark.parametrize("degrees", [0.0, 1e-7, 1e-3, 0.1, 90.0, 179.9999, 180.0])
+def test_angle_keeps_its_digits_at_both_ends(degrees: float) -> None:
+    assert se3.angle_deg(se3.yaw(degrees)[:3, :3]) == pytest.approx(degrees, rel=1e-9, abs=1e-12)
+
+
+@given(arrays(np.float64, (3, 3), elements=st.floats(-10, 10)))
+def test_project_gives_a_rotation_for_any_matrix(M: np.ndarray) -> None:
+    R = se3.project(M)
+    assert np.allclose(R @ R.T, np.eye(3), atol=1e-9)
+    assert np.linalg.det(R) == pytest.approx(1.0)
+
+
+def test_project_keeps_a_rotation_and_repairs_a_drifted_one() -> None:
+    R = random_motion(3)[:3, :3]
+    assert np.allclose(se3.project(R), R, atol=1e-12)
+    assert se3.angle_deg(se3.project(R * 1.01) @ R.T) < 1e-6
+
+
+@given(seeds)
+def test_random_rotation_is_proper(seed: int) -> None:
+    R = se3.random_rotation(np.random.default_rng(seed))
+    assert np.allclose(R @ R.T, np.eye(3), atol=1e-12)
+    assert np.linalg.det(R) == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize(
+    "T, words",
+    [
+        (np.eye(3), "shape"),
+        (np.full((4, 4), np.nan), "not finite"),
+        (np.diag([1.0, 1.0, -1.0, 1.0]), "no rotation"),
+        (np.diag([2.0, 2.0, 2.0, 1.0]), "no rotation"),
+        (se3.from_rt(np.eye(3), np.ones(3)).T, "transposed"),
+    ],
+)
+def test_check_refuses(T: np.ndarray, words: str) -> None:
+    with pytest.raises(ValueError, match=words):
+        se3.check(T, "T_target_source")
+
+
+def test_exp_is_linear_near_zero() -> None:
+    twist = np.array([1e-8, -2e-8, 3e-8, 0.1, 0.2, 0.3])
+    T = se3.exp(twist)
+    assert np.allclose(T[:3, :3], np.eye(3) + se3.skew(twist[:3]), atol=1e-14)
+    assert np.allclose(T[:3, 3], twist[3:])
