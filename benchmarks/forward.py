@@ -24,19 +24,22 @@ import torch
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
-from multiply_adds import count_multiply_adds  # noqa: E402
-
 from hybridreg.learned.batch import Batch, make_batch  # noqa: E402
 from hybridreg.learned.config import NetworkConfig  # noqa: E402
 from hybridreg.learned.grid import grid_subsample  # noqa: E402
 from hybridreg.learned.lgr import local_to_global  # noqa: E402
 from hybridreg.learned.network import RegistrationNetwork  # noqa: E402
 from hybridreg.learned.sizes import named_config  # noqa: E402
+from multiply_adds import count_multiply_adds  # noqa: E402
 
 
 def real_cloud(name: str) -> torch.Tensor:
     """One cloud (N, 3) of the real pair, or of a made-up street where the data is absent."""
-    places = [Path(os.environ.get("HYBRIDREG_DATA", "")), ROOT / "../shared/data/real", ROOT / "../../shared/data/real"]
+    places = [
+        Path(os.environ.get("HYBRIDREG_DATA", "")),
+        ROOT / "../shared/data/real",
+        ROOT / "../../shared/data/real",
+    ]
     for place in places:
         file = place / "hdl32-small-gicp" / f"{name}.npz"
         if file.is_file():
@@ -120,7 +123,9 @@ def report(config: NetworkConfig, n_points: int, repeats: int) -> None:
     for name, number in counted.items():
         print(f"{name:36s} {number / 1e9:6.2f} G multiply-adds  floor {number / rate:6.3f} s")
     total = sum(counted.values())
-    print(f"{'all':36s} {total / 1e9:6.2f} G multiply-adds  floor {total / rate:6.3f} s at {rate / 1e9:.0f} G/s")
+    print(
+        f"{'all':36s} {total / 1e9:6.2f} G multiply-adds  floor {total / rate:6.3f} s at {rate / 1e9:.0f} G/s"
+    )
 
 
 def main() -> None:

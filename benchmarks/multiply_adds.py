@@ -7,12 +7,11 @@ from collections import Counter
 from typing import Any
 
 import torch
-from torch import nn
-
 from hybridreg.learned import kpconv
 from hybridreg.learned.batch import Batch
 from hybridreg.learned.network import RegistrationNetwork
 from hybridreg.learned.patch_pairs import size_chunks
+from torch import nn
 
 
 @torch.no_grad()
@@ -23,7 +22,9 @@ def count_multiply_adds(network: RegistrationNetwork, batch: Batch) -> dict[str,
     output = network(batch)
     for hook in hooks:
         hook.remove()
-    chunks = size_chunks(network.pair_up(output.encoding, output.superpoints.target, output.superpoints.source))
+    chunks = size_chunks(
+        network.pair_up(output.encoding, output.superpoints.target, output.superpoints.source)
+    )
     cells = sum(len(c) * (c.target_mask.shape[1] + 1) * (c.source_mask.shape[1] + 1) for c in chunks)
     counted["point scores"] = cells * network.config.backbone.fine_dim
     counted["Sinkhorn"] = cells * 2 * network.transport.iterations
@@ -38,7 +39,9 @@ def _counter(counted: Counter[str], module: nn.Module) -> Any:
     def convolution(_: nn.Module, args: tuple[Any, ...], out: torch.Tensor) -> None:
         assert isinstance(module, kpconv.KPConv)
         _, queries, supports, neighbors = args[:4]
-        influence = args[4] or kpconv.kernel_influence(queries, supports, neighbors, module.kernel, module.sigma)
+        influence = args[4] or kpconv.kernel_influence(
+            queries, supports, neighbors, module.kernel, module.sigma
+        )
         n_kernel, dim_in, dim_out = module.weights.shape
         counted["KPConv, gathering"] += len(influence.index) * dim_in
         counted["KPConv, products"] += len(queries) * n_kernel * dim_in * dim_out

@@ -5,12 +5,11 @@ from __future__ import annotations
 
 import numpy as np
 import torch
-from torch import Tensor, nn
-
 from hybridreg.learned.blocks import BlockPlan, ConvBlock, ResidualBlock, Surroundings, Unary, upsample
 from hybridreg.learned.config import BackboneConfig
 from hybridreg.learned.kpconv import Influence, kernel_influence
 from hybridreg.learned.pyramid import Pyramid
+from torch import Tensor, nn
 
 
 class KpconvFpn(nn.Module):

@@ -8,12 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 import torch
-from torch import Tensor
-
 from hybridreg.learned.config import NetworkConfig
 from hybridreg.learned.image_input import image_tensor
 from hybridreg.learned.input_features import input_features
 from hybridreg.learned.pyramid import Pyramid, build_pyramid
+from torch import Tensor
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -59,4 +58,6 @@ def make_batch(
     tensor = None
     if image is not None and config.image is not None:
         tensor = image_tensor(image, config.image.height, config.image.width).to(device)
-    return Batch(pyramid=pyramid, features=input_features(pyramid, config.backbone.input_features), image=tensor)
+    return Batch(
+        pyramid=pyramid, features=input_features(pyramid, config.backbone.input_features), image=tensor
+    )

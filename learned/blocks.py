@@ -7,11 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 import torch
-from torch import Tensor, nn
-from torch.nn import functional as F
-
 from hybridreg.learned.kpconv import Influence, KPConv
 from hybridreg.learned.max_pool import max_pool
+from torch import Tensor, nn
+from torch.nn import functional as F
 
 _SLOPE = 0.1
 _EPS = 1e-5
@@ -51,7 +50,9 @@ class PointGroupNorm(nn.Module):
         variance = (features - mean).square().mean(0)
         grouped = mean.view(self.groups, -1)
         group_mean = grouped.mean(1, keepdim=True)
-        group_variance = (variance.view(self.groups, -1) + (grouped - group_mean).square()).mean(1, keepdim=True)
+        group_variance = (variance.view(self.groups, -1) + (grouped - group_mean).square()).mean(
+            1, keepdim=True
+        )
         scale = (group_variance + _EPS).rsqrt().expand_as(grouped).flatten() * self.weight
         shift = self.bias - group_mean.expand_as(grouped).flatten() * scale
         return torch.addcmul(shift, features, scale)
@@ -60,7 +61,9 @@ class PointGroupNorm(nn.Module):
 class Unary(nn.Module):
     """Linear, then group normalisation, then LeakyReLU unless ``activate`` is false."""
 
-    def __init__(self, dim_in: int, dim_out: int, groups: int, per_cloud: bool, *, activate: bool = True) -> None:
+    def __init__(
+        self, dim_in: int, dim_out: int, groups: int, per_cloud: bool, *, activate: bool = True
+    ) -> None:
         super().__init__()
         self.activate = activate
         self.linear = nn.Linear(dim_in, dim_out)
@@ -113,7 +116,9 @@ class ResidualBlock(nn.Module):
         self.norm = PointGroupNorm(middle, groups, per_cloud)
         self.unary_out = Unary(middle, plan.dim_out, groups, per_cloud, activate=False)
         widens = plan.dim_in != plan.dim_out
-        self.unary_shortcut = Unary(plan.dim_in, plan.dim_out, groups, per_cloud, activate=False) if widens else None
+        self.unary_shortcut = (
+            Unary(plan.dim_in, plan.dim_out, groups, per_cloud, activate=False) if widens else None
+        )
 
     def forward(self, features: Tensor, around: Surroundings) -> Tensor:
         """(M, C_in) to (N, C_out)."""

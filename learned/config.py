@@ -32,7 +32,9 @@ class BackboneConfig:
 
     def __post_init__(self) -> None:
         if len(self.neighbor_limits) != self.stages:
-            raise ValueError(f"{len(self.neighbor_limits)} neighbor_limits for {self.stages} stages: give one a stage")
+            raise ValueError(
+                f"{len(self.neighbor_limits)} neighbor_limits for {self.stages} stages: give one a stage"
+            )
         if not 1 <= self.fine_stage < self.stages:
             raise ValueError(f"fine_stage {self.fine_stage} must lie in 1..{self.stages - 1}")
         if (self.init_dim // 2) % self.groups:

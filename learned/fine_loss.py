@@ -3,13 +3,11 @@
 
 from __future__ import annotations
 
-import torch
-from torch import Tensor
-
 from hybridreg.learned.blocks import pad_row
 from hybridreg.learned.distances import squared_distances
 from hybridreg.learned.patch_pairs import PatchPairs
 from hybridreg.learned.procrustes import apply_transform
+from torch import Tensor
 
 
 def assignment_loss(
@@ -36,7 +34,9 @@ def assignment_loss(
     return -assignment[labels].mean()
 
 
-def true_assignment(pairs: PatchPairs, target: Tensor, source: Tensor, transform: Tensor, radius: float) -> Tensor:
+def true_assignment(
+    pairs: PatchPairs, target: Tensor, source: Tensor, transform: Tensor, radius: float
+) -> Tensor:
     """(B, n + 1, m + 1) bool: true partners, and the slack of valid points that have none."""
     points_target = pad_row(target)[pairs.target_index]
     points_source = apply_transform(pad_row(source)[pairs.source_index], transform)

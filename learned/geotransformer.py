@@ -3,11 +3,10 @@
 
 from __future__ import annotations
 
-from torch import Tensor, nn
-
 from hybridreg.learned.attention import AttentionLayer
 from hybridreg.learned.config import TransformerConfig
 from hybridreg.learned.structure_embedding import StructureEmbedding
+from torch import Tensor, nn
 
 
 class GeoTransformerBlock(nn.Module):
@@ -22,7 +21,8 @@ class GeoTransformerBlock(nn.Module):
             StructureEmbedding(dim, config.sigma_d, config.sigma_a, config.angle_k) if geometric else None
         )
         self.layers = nn.ModuleList(
-            AttentionLayer(dim, config.heads, geometric=geometric and kind == "self") for kind in config.blocks
+            AttentionLayer(dim, config.heads, geometric=geometric and kind == "self")
+            for kind in config.blocks
         )
         self.out = nn.Linear(dim, config.output_dim)
 

@@ -28,7 +28,9 @@ def grid_subsample(points: Tensor, voxel: float) -> Tensor:
         No points, or a voxel that is not positive, or so small that cells cannot be numbered.
     """
     if points.shape[0] == 0 or voxel <= 0:
-        raise ValueError(f"grid_subsample needs points and a positive voxel, got {points.shape[0]} and {voxel}")
+        raise ValueError(
+            f"grid_subsample needs points and a positive voxel, got {points.shape[0]} and {voxel}"
+        )
     cells = _cells(points, voxel)
     _, cell_of_point, counts = torch.unique(cells, return_inverse=True, return_counts=True)
     sums = torch.zeros(counts.shape[0], 3, dtype=torch.float64, device=points.device)
@@ -45,5 +47,7 @@ def _cells(points: Tensor, voxel: float) -> Tensor:
     index = torch.floor((points - origin) / size).long()
     extent = index.amax(0) + 1
     if float(extent.double().prod()) > 2**62:
-        raise ValueError(f"{extent.tolist()} cells of {voxel} m cannot be numbered: the voxel is too small for the cloud")
+        raise ValueError(
+            f"{extent.tolist()} cells of {voxel} m cannot be numbered: the voxel is too small for the cloud"
+        )
     return index[:, 0] + extent[0] * (index[:, 1] + extent[1] * index[:, 2])

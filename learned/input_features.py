@@ -6,9 +6,8 @@ from __future__ import annotations
 from typing import Literal
 
 import torch
-from torch import Tensor
-
 from hybridreg.learned.pyramid import Pyramid
+from torch import Tensor
 
 _COLUMN = 4.0  # metres: edge of the columns whose lowest point is taken for the ground
 

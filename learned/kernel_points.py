@@ -32,7 +32,9 @@ def _gradient(points: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
     return 20.0 * points - (difference / distance[..., None] ** 3).sum(1)
 
 
-def kernel_points(n_points: int, radius: float, rng: np.random.Generator | None = None) -> npt.NDArray[np.float32]:
+def kernel_points(
+    n_points: int, radius: float, rng: np.random.Generator | None = None
+) -> npt.NDArray[np.float32]:
     """Kernel points of one layer.
 
     Parameters

@@ -8,10 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 import torch
+from hybridreg.learned.kernel_points import kernel_points
 from torch import Tensor, nn
 from torch.nn import functional as F
-
-from hybridreg.learned.kernel_points import kernel_points
 
 # Entries of (kernel points, queries, neighbours) looked at in one go: a megabyte, small enough for the cache.
 _CHUNK_ENTRIES = 2**18
@@ -31,7 +30,9 @@ class Influence:
     chunk: int  # queries of a chunk; the last one may have fewer
 
 
-def kernel_influence(queries: Tensor, supports: Tensor, neighbors: Tensor, kernel: Tensor, sigma: float) -> Influence:
+def kernel_influence(
+    queries: Tensor, supports: Tensor, neighbors: Tensor, kernel: Tensor, sigma: float
+) -> Influence:
     """Linear influence ``max(0, 1 - |y_j - q_i - x_k| / sigma)`` of every neighbour on every kernel point.
 
     Parameters
@@ -56,7 +57,9 @@ def kernel_influence(queries: Tensor, supports: Tensor, neighbors: Tensor, kerne
     return Influence(index, weight, counts.cumsum(0) - counts, size)
 
 
-def _influence_chunk(local: Tensor, neighbors: Tensor, kernel: Tensor, sigma: float) -> tuple[Tensor, Tensor, Tensor]:
+def _influence_chunk(
+    local: Tensor, neighbors: Tensor, kernel: Tensor, sigma: float
+) -> tuple[Tensor, Tensor, Tensor]:
     n, slots = neighbors.shape
     local = local.view(n * slots, 3)
     # |a - x|^2 as |x|^2 - 2 a.x + |a|^2: one matrix product, no (n, k, K, 3) tensor
@@ -65,7 +68,9 @@ def _influence_chunk(local: Tensor, neighbors: Tensor, kernel: Tensor, sigma: fl
     reached = squared < sigma**2  # (K, n * k)
     entry = _flat_nonzero(reached)
     weight = 1.0 - squared.flatten().index_select(0, entry).clamp_min_(0.0).sqrt_().div_(sigma)
-    counts = reached.view(torch.uint8).view(-1, slots).sum(1, dtype=torch.int64)  # as bytes: bools are added slowly
+    counts = (
+        reached.view(torch.uint8).view(-1, slots).sum(1, dtype=torch.int64)
+    )  # as bytes: bools are added slowly
     starts = torch.arange(len(kernel), device=local.device) * (n * slots)
     begin = starts.repeat_interleave(counts.view(len(kernel), n).sum(1))
     return neighbors.flatten().index_select(0, entry - begin), weight, counts
@@ -109,14 +114,18 @@ def kernel_point_convolution(
         influence.index, features, influence.offsets, mode="sum", per_sample_weights=influence.weight
     )
     chunks = bags.split(influence.chunk * n_kernel)
-    gathered = torch.cat([chunk.view(n_kernel, -1, dim_in).transpose(0, 1) for chunk in chunks])  # (N, K, C_in)
+    gathered = torch.cat(
+        [chunk.view(n_kernel, -1, dim_in).transpose(0, 1) for chunk in chunks]
+    )  # (N, K, C_in)
     out = gathered.flatten(1) @ weights.view(n_kernel * dim_in, dim_out)
     out = out / _positive_neighbors(features, neighbors)[:, None]
     return out if bias is None else out + bias
 
 
 def _positive_neighbors(features: Tensor, neighbors: Tensor) -> Tensor:
-    positive = torch.cat([features.detach().sum(1) > 0, neighbors.new_zeros(1, dtype=torch.bool)]).view(torch.uint8)
+    positive = torch.cat([features.detach().sum(1) > 0, neighbors.new_zeros(1, dtype=torch.bool)]).view(
+        torch.uint8
+    )
     return positive.take(neighbors).sum(1, dtype=torch.int64).clamp_min(1)
 
 
@@ -126,7 +135,13 @@ class KPConv(nn.Module):
     kernel: Tensor
 
     def __init__(
-        self, dim_in: int, dim_out: int, radius: float, sigma: float, n_kernel: int, rng: np.random.Generator | None
+        self,
+        dim_in: int,
+        dim_out: int,
+        radius: float,
+        sigma: float,
+        n_kernel: int,
+        rng: np.random.Generator | None,
     ) -> None:
         super().__init__()
         self.sigma = sigma
@@ -138,7 +153,12 @@ class KPConv(nn.Module):
         nn.init.uniform_(self.bias, -bound, bound)
 
     def forward(
-        self, features: Tensor, queries: Tensor, supports: Tensor, neighbors: Tensor, influence: Influence | None = None
+        self,
+        features: Tensor,
+        queries: Tensor,
+        supports: Tensor,
+        neighbors: Tensor,
+        influence: Influence | None = None,
     ) -> Tensor:
         """(M, C_in) to (N, C_out); ``influence`` may be handed in by a stage that shares its kernel points."""
         if influence is None:

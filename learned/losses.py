@@ -6,8 +6,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import torch
-from torch import Tensor
-
 from hybridreg.learned.circle_loss import circle_loss
 from hybridreg.learned.config import LossConfig
 from hybridreg.learned.fine_loss import assignment_loss
@@ -17,6 +15,7 @@ from hybridreg.learned.omp import OverlapLogits
 from hybridreg.learned.patch_pairs import PatchPairs
 from hybridreg.learned.superpoint_mask import Kept
 from hybridreg.learned.targets import Targets
+from torch import Tensor
 
 
 @dataclass(frozen=True)
@@ -47,7 +46,11 @@ def mask_loss(overlap: OverlapLogits | None, targets: Targets, config: LossConfi
     sides = ((overlap.target, targets.mask_target), (overlap.source, targets.mask_source))
     losses = [
         focal_loss(
-            logits, truth, alpha=config.focal_alpha, gamma=config.focal_gamma, alpha_mode=config.focal_alpha_mode
+            logits,
+            truth,
+            alpha=config.focal_alpha,
+            gamma=config.focal_gamma,
+            alpha_mode=config.focal_alpha_mode,
         )
         for logits, truth in sides
     ]
@@ -66,7 +69,12 @@ def compute_losses(
 ) -> Losses:
     """All losses of a step: features (m, c), (n, c) of the kept superpoints, assignments of the patch pairs."""
     fine = assignment_loss(
-        assignment, pairs, encoding.target.points, encoding.source.points, targets.transform, config.positive_radius
+        assignment,
+        pairs,
+        encoding.target.points,
+        encoding.source.points,
+        targets.transform,
+        config.positive_radius,
     )
     coarse = circle_loss(*features, overlap_matrix(targets, kept), config)
     return Losses(coarse, fine, mask_loss(overlap, targets, config))

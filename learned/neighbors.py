@@ -11,7 +11,9 @@ from torch import Tensor
 _CHUNK_PAIRS = 2**25
 
 
-def radius_neighbors(queries: Tensor, supports: Tensor, radius: float, limit: int, *, workers: int = 1) -> Tensor:
+def radius_neighbors(
+    queries: Tensor, supports: Tensor, radius: float, limit: int, *, workers: int = 1
+) -> Tensor:
     """Indices of at most ``limit`` supports nearer than ``radius``, nearest first.
 
     Parameters
@@ -55,7 +57,9 @@ def nearest_neighbor(queries: Tensor, supports: Tensor) -> Tensor:
         _, index = cKDTree(supports.numpy().astype(np.float64)).query(queries.numpy())
         return torch.from_numpy(np.asarray(index, dtype=np.int64))
     blocks = queries.split(max(1, _CHUNK_PAIRS // supports.shape[0]))
-    return torch.cat([torch.cdist(b, supports, compute_mode="donot_use_mm_for_euclid_dist").argmin(1) for b in blocks])
+    return torch.cat(
+        [torch.cdist(b, supports, compute_mode="donot_use_mm_for_euclid_dist").argmin(1) for b in blocks]
+    )
 
 
 def count_neighbors(queries: Tensor, supports: Tensor, radius: float) -> Tensor:

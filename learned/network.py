@@ -7,9 +7,6 @@ from dataclasses import dataclass
 from typing import Literal
 
 import torch
-from torch import Tensor, nn
-from torch.nn import functional as F
-
 from hybridreg.learned.backbone import KpconvFpn
 from hybridreg.learned.batch import Batch
 from hybridreg.learned.blocks import pad_row
@@ -25,6 +22,8 @@ from hybridreg.learned.sinkhorn import OptimalTransport
 from hybridreg.learned.superpoint_mask import Kept, cap, keep_all, keep_predicted
 from hybridreg.learned.superpoint_matching import SuperpointMatches, match_superpoints
 from hybridreg.learned.vgam import VisualGeometricAttention
+from torch import Tensor, nn
+from torch.nn import functional as F
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -116,7 +115,9 @@ class RegistrationNetwork(nn.Module):
             image=None if self.image_encoder is None else self.image_encoder(batch.image),
         )
 
-    def _cloud(self, pyramid: Pyramid, cloud: int, node_features: Tensor, point_features: Tensor) -> CloudEncoding:
+    def _cloud(
+        self, pyramid: Pyramid, cloud: int, node_features: Tensor, point_features: Tensor
+    ) -> CloudEncoding:
         nodes = pyramid.clouds(pyramid.stages - 1)[cloud]
         points = pyramid.clouds(self.config.backbone.fine_stage - 1)[cloud]
         return CloudEncoding(
@@ -135,8 +136,12 @@ class RegistrationNetwork(nn.Module):
 
     def keep(self, encoding: Encoding, overlap: OverlapLogits | None) -> tuple[Kept, Kept]:
         """Choose the superpoints of both clouds that go on. An uninformed mask keeps everything."""
-        target = self._keep(encoding.target, None if overlap is None or not overlap.informed else overlap.target)
-        source = self._keep(encoding.source, None if overlap is None or not overlap.informed else overlap.source)
+        target = self._keep(
+            encoding.target, None if overlap is None or not overlap.informed else overlap.target
+        )
+        source = self._keep(
+            encoding.source, None if overlap is None or not overlap.informed else overlap.source
+        )
         return target, source
 
     def _keep(self, cloud: CloudEncoding, logits: Tensor | None) -> Kept:
@@ -181,14 +186,20 @@ class RegistrationNetwork(nn.Module):
         """The patches of superpoints (B,), (B,) side by side."""
         return pair_patches(encoding.target.patches, encoding.source.patches, target_nodes, source_nodes)
 
-    def assign(self, encoding: Encoding, pairs: PatchPairs, form: Literal["log", "kernel"] = "log") -> Tensor:
+    def assign(
+        self,
+        encoding: Encoding,
+        pairs: PatchPairs,
+        form: Literal["log", "kernel"] = "log",
+        iterations: int | None = None,
+    ) -> Tensor:
         """Log-assignments (B, n + 1, m + 1) of patch pairs, the last row and column the slack."""
         target = F.embedding(pairs.target_index, pad_row(encoding.target.point_features))
         source = F.embedding(pairs.source_index, pad_row(encoding.source.point_features))
         dim = target.shape[2]
         scale = dim**0.5 if self.config.matching.score_scale == "sqrt" else float(dim)
         scores = torch.bmm(target, source.transpose(1, 2)) / scale
-        return self.transport(scores, pairs.target_mask, pairs.source_mask, form)
+        return self.transport(scores, pairs.target_mask, pairs.source_mask, form, iterations)
 
     def match_points(self, encoding: Encoding, superpoints: SuperpointMatches) -> PointMatches:
         """Point correspondences of the matched superpoints' patches."""

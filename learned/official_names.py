@@ -12,10 +12,19 @@ _HEAD_RULES = (
     (r"^transformer\.embedding\.frequency$", "transformer.embedding.embedding.div_term"),
     (r"^transformer\.embedding\.distance\.", "transformer.embedding.proj_d."),
     (r"^transformer\.embedding\.angle\.", "transformer.embedding.proj_a."),
-    (r"^transformer\.layers\.(\d+)\.attention\.query\.", r"transformer.layers.\1.attention.attention.proj_q."),
+    (
+        r"^transformer\.layers\.(\d+)\.attention\.query\.",
+        r"transformer.layers.\1.attention.attention.proj_q.",
+    ),
     (r"^transformer\.layers\.(\d+)\.attention\.key\.", r"transformer.layers.\1.attention.attention.proj_k."),
-    (r"^transformer\.layers\.(\d+)\.attention\.value\.", r"transformer.layers.\1.attention.attention.proj_v."),
-    (r"^transformer\.layers\.(\d+)\.attention\.structure\.", r"transformer.layers.\1.attention.attention.proj_p."),
+    (
+        r"^transformer\.layers\.(\d+)\.attention\.value\.",
+        r"transformer.layers.\1.attention.attention.proj_v.",
+    ),
+    (
+        r"^transformer\.layers\.(\d+)\.attention\.structure\.",
+        r"transformer.layers.\1.attention.attention.proj_p.",
+    ),
     (r"^transformer\.layers\.(\d+)\.(linear|norm)\.", r"transformer.layers.\1.attention.\2."),
     (r"^transformer\.layers\.(\d+)\.feed_forward\.", r"transformer.layers.\1.output."),
     (r"^transformer\.layers\.", "transformer.transformer.layers."),

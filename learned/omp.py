@@ -6,12 +6,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import torch
-from torch import Tensor, nn
-
 from hybridreg.learned.attention import Attention, AttentionLayer
 from hybridreg.learned.config import OmpConfig
 from hybridreg.learned.image_encoder import ImageFeatures, pool_tokens
 from hybridreg.learned.positions import image_grid_encoding
+from torch import Tensor, nn
 
 
 @dataclass(frozen=True)
@@ -43,7 +42,9 @@ class OverlapPredictor(nn.Module):
         self.value = nn.Linear(dim, dim)
         self.attention = Attention(dim, config.heads)
         self.attention_out = nn.Linear(dim, dim)
-        self.norms = nn.ModuleList(nn.LayerNorm(dim) for _ in range(2)) if config.formula == "figure" else None
+        self.norms = (
+            nn.ModuleList(nn.LayerNorm(dim) for _ in range(2)) if config.formula == "figure" else None
+        )
         self.expand, self.squeeze = nn.Linear(dim, 2 * dim), nn.Linear(2 * dim, dim)
         self.logit = nn.Linear(dim, 1)
 

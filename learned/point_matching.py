@@ -6,10 +6,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import torch
-from torch import Tensor
-
 from hybridreg.learned.config import MatchingConfig
 from hybridreg.learned.patch_pairs import PatchPairs
+from torch import Tensor
 
 
 @dataclass(frozen=True)
@@ -61,7 +60,11 @@ def gather_matches(
         matches are taken without a threshold.
     """
     strict = (config.topk, config.confidence, config.mutual)
-    for topk, threshold, mutual in (strict, (config.topk, min(config.confidence, 0.01), config.mutual), (1, 0.0, True)):
+    for topk, threshold, mutual in (
+        strict,
+        (config.topk, min(config.confidence, 0.01), config.mutual),
+        (1, 0.0, True),
+    ):
         found = [
             _matches_of(pairs, assignment, target, source, topk=topk, threshold=threshold, mutual=mutual)
             for pairs, assignment in blocks
@@ -72,7 +75,14 @@ def gather_matches(
 
 
 def _matches_of(
-    pairs: PatchPairs, assignment: Tensor, target: Tensor, source: Tensor, *, topk: int, threshold: float, mutual: bool
+    pairs: PatchPairs,
+    assignment: Tensor,
+    target: Tensor,
+    source: Tensor,
+    *,
+    topk: int,
+    threshold: float,
+    mutual: bool,
 ) -> PointMatches:
     probability = assignment[:, :-1, :-1].exp()
     chosen = mutual_top_k(
@@ -81,7 +91,12 @@ def _matches_of(
     pair, row, column = chosen.nonzero(as_tuple=True)
     target_index, source_index = pairs.target_index[pair, row], pairs.source_index[pair, column]
     return PointMatches(
-        target[target_index], source[source_index], probability[chosen], pairs.group[pair], target_index, source_index
+        target[target_index],
+        source[source_index],
+        probability[chosen],
+        pairs.group[pair],
+        target_index,
+        source_index,
     )
 
 

@@ -29,7 +29,10 @@ def weighted_procrustes(source: Tensor, target: Tensor, weight: Tensor) -> Tenso
     identity = torch.eye(4, dtype=source.dtype)
     total = weight.sum(-1, keepdim=True)
     weight = (weight / (total + _EPS))[..., None]  # (..., n, 1)
-    centre_source, centre_target = (source * weight).sum(-2, keepdim=True), (target * weight).sum(-2, keepdim=True)
+    centre_source, centre_target = (
+        (source * weight).sum(-2, keepdim=True),
+        (target * weight).sum(-2, keepdim=True),
+    )
     covariance = (source - centre_source).transpose(-1, -2) @ (weight * (target - centre_target))
     usable = torch.isfinite(covariance).flatten(-2).all(-1) & (total[..., 0] > 1e-8)
     covariance = torch.where(usable[..., None, None], covariance, identity[:3, :3])

@@ -6,11 +6,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import torch
-from torch import Tensor
-
 from hybridreg.learned.config import BackboneConfig
 from hybridreg.learned.grid import grid_subsample
 from hybridreg.learned.neighbors import count_neighbors, nearest_neighbor, radius_neighbors
+from torch import Tensor
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -48,7 +47,9 @@ class Pyramid:
         return target, source
 
 
-def build_pyramid(target: Tensor, source: Tensor, config: BackboneConfig, *, subsample: bool = False) -> Pyramid:
+def build_pyramid(
+    target: Tensor, source: Tensor, config: BackboneConfig, *, subsample: bool = False
+) -> Pyramid:
     """Subsample both clouds stage by stage and search all neighbours.
 
     Parameters
@@ -75,7 +76,9 @@ def build_pyramid(target: Tensor, source: Tensor, config: BackboneConfig, *, sub
         points=tuple(torch.cat([level[s] for level in levels]) for s in stages),
         lengths=tuple((len(levels[0][s]), len(levels[1][s])) for s in stages),
         neighbors=tuple(_stack([(c[s], c[s]) for c in levels], radius(s), limit[s]) for s in stages),
-        subsampling=tuple(_stack([(c[s + 1], c[s]) for c in levels], radius(s), limit[s]) for s in stages[:-1]),
+        subsampling=tuple(
+            _stack([(c[s + 1], c[s]) for c in levels], radius(s), limit[s]) for s in stages[:-1]
+        ),
         upsampling=tuple(_stack_nearest([(c[s], c[s + 1]) for c in levels]) for s in stages[:-1]),
     )
 

@@ -23,16 +23,20 @@ class OptimalTransport(nn.Module):
         self.alpha = nn.Parameter(torch.tensor(1.0))
 
     def forward(
-        self, scores: Tensor, rows: Tensor, columns: Tensor, form: Literal["log", "kernel"] = "log"
+        self,
+        scores: Tensor,
+        rows: Tensor,
+        columns: Tensor,
+        form: Literal["log", "kernel"] = "log",
+        iterations: int | None = None,
     ) -> Tensor:
         """Scores (B, n, m) with masks (B, n), (B, m) to log-assignments (B, n + 1, m + 1).
 
         A perfect match has the value 0. Entries of padded rows and columns are below -1e11. Every pair must
         have a valid row and a valid column.
         """
-        if form == "log":
-            return log_sinkhorn(scores, rows, columns, self.alpha, self.iterations)
-        return kernel_sinkhorn(scores, rows, columns, self.alpha, self.iterations)
+        solve = log_sinkhorn if form == "log" else kernel_sinkhorn
+        return solve(scores, rows, columns, self.alpha, iterations or self.iterations)
 
 
 def log_sinkhorn(scores: Tensor, rows: Tensor, columns: Tensor, alpha: Tensor, iterations: int) -> Tensor:

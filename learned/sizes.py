@@ -26,7 +26,11 @@ def _full() -> NetworkConfig:
 def _small() -> NetworkConfig:
     return NetworkConfig(
         backbone=BackboneConfig(
-            init_dim=32, groups=8, neighbor_limits=(40,) * 5, norm_scope="per_cloud", shared_kernel_points=True
+            init_dim=32,
+            groups=8,
+            neighbor_limits=(40,) * 5,
+            norm_scope="per_cloud",
+            shared_kernel_points=True,
         ),
         matching=MatchingConfig(patch_points=64, sinkhorn_iterations=50),
         loss=LossConfig(targets=64),
@@ -59,7 +63,11 @@ def _nano() -> NetworkConfig:
         backbone=backbone,
         transformer=TransformerConfig(hidden_dim=64, output_dim=64, heads=2, blocks=("self", "cross")),
         matching=MatchingConfig(
-            superpoint_matches=64, max_superpoints=400, matching_radius=1.0, patch_points=32, sinkhorn_iterations=20
+            superpoint_matches=64,
+            max_superpoints=400,
+            matching_radius=1.0,
+            patch_points=32,
+            sinkhorn_iterations=20,
         ),
         lgr=LgrConfig(acceptance_radius=1.0),
         loss=LossConfig(targets=32, positive_radius=1.0),

@@ -6,9 +6,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import torch
-from torch import Tensor
-
 from hybridreg.learned.distances import squared_distances
+from torch import Tensor
 
 
 @dataclass(frozen=True)

@@ -6,14 +6,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import torch
-from torch import Tensor
-
 from hybridreg.learned.blocks import pad_row
 from hybridreg.learned.config import NetworkConfig
 from hybridreg.learned.distances import squared_distances
 from hybridreg.learned.patches import Patches, build_patches
 from hybridreg.learned.procrustes import apply_transform
 from hybridreg.learned.pyramid import Pyramid
+from torch import Tensor
 
 _CHUNK_VALUES = 2**23
 _FAR = 1e12
@@ -65,7 +64,10 @@ def compute_targets(pyramid: Pyramid, transform: Tensor, config: NetworkConfig) 
 
 
 def node_overlaps(
-    nodes: tuple[Tensor, Tensor], points: tuple[Tensor, Tensor], patches: tuple[Patches, Patches], radius: float
+    nodes: tuple[Tensor, Tensor],
+    points: tuple[Tensor, Tensor],
+    patches: tuple[Patches, Patches],
+    radius: float,
 ) -> tuple[tuple[Tensor, Tensor], Tensor]:
     """Superpoint pairs with ``o_ij > 0``, row by row, and ``o_ij``.
 
@@ -85,7 +87,10 @@ def node_overlaps(
 
 
 def _candidates(
-    nodes: tuple[Tensor, Tensor], points: tuple[Tensor, Tensor], patches: tuple[Patches, Patches], radius: float
+    nodes: tuple[Tensor, Tensor],
+    points: tuple[Tensor, Tensor],
+    patches: tuple[Patches, Patches],
+    radius: float,
 ) -> tuple[Tensor, Tensor]:
     # Two patches can only overlap where the balls around them do.
     reach = [_reach(nodes[side], points[side], patches[side]) for side in (0, 1)]
@@ -102,7 +107,11 @@ def _reach(nodes: Tensor, points: Tensor, patches: Patches) -> Tensor:
 
 
 def _overlap_of(
-    points: tuple[Tensor, Tensor], patches: tuple[Patches, Patches], target: Tensor, source: Tensor, radius: float
+    points: tuple[Tensor, Tensor],
+    patches: tuple[Patches, Patches],
+    target: Tensor,
+    source: Tensor,
+    radius: float,
 ) -> Tensor:
     mask_target, mask_source = patches[0].mask[target], patches[1].mask[source]
     squared = squared_distances(points[0][patches[0].index[target]], points[1][patches[1].index[source]])

@@ -6,12 +6,11 @@ from __future__ import annotations
 import math
 
 import torch
-from torch import Tensor, nn
-
 from hybridreg.learned.attention import Attention, AttentionLayer, FeedForward, merge_heads, split_heads
 from hybridreg.learned.config import VgamConfig
 from hybridreg.learned.image_encoder import ImageFeatures, pool_tokens
 from hybridreg.learned.positions import PointPosition, image_grid_encoding
+from torch import Tensor, nn
 
 
 class VisualAttention(nn.Module):
@@ -91,7 +90,9 @@ class VisualGeometricAttention(nn.Module):
         self.pool = config.pool
         self.token = nn.Linear(image_dim, dim)
         self.position = PointPosition(dim, config.point_position)
-        self.layers = nn.ModuleList(VisualLayer(dim, config.heads, config.gated) for _ in range(config.repeats))
+        self.layers = nn.ModuleList(
+            VisualLayer(dim, config.heads, config.gated) for _ in range(config.repeats)
+        )
 
     def forward(self, features: Tensor, points: Tensor, image: ImageFeatures) -> Tensor:
         """Features (n, d) at points (n, 3), metres, in the sensor's frame, to (n, d)."""

@@ -7,10 +7,6 @@ import math
 
 import numpy as np
 import torch
-from plan import Recording
-from scipy.spatial import cKDTree
-from torch import Tensor
-
 from hybridreg.learned.circle_loss import circle_loss
 from hybridreg.learned.fine_loss import assignment_loss
 from hybridreg.learned.lgr import local_to_global
@@ -19,6 +15,9 @@ from hybridreg.learned.network import Output
 from hybridreg.learned.point_matching import mutual_top_k
 from hybridreg.learned.superpoint_matching import SuperpointMatches, match_superpoints
 from hybridreg.learned.targets import Targets, compute_targets
+from plan import Recording
+from scipy.spatial import cKDTree
+from torch import Tensor
 
 # The log-assignment of a padded entry is minus infinity up to rounding: about -1e12, where neighbouring float32
 # numbers are 65536 apart. Both sides must be below this; their difference means nothing.
@@ -51,7 +50,9 @@ def _forward(recording: Recording) -> tuple[dict[str, Tensor], Output]:
         )
         for stage in (0, 1)
     ]
-    seen["feats_coarse"], seen["feats_fine"] = network.backbone(recording.batch.features, recording.batch.pyramid)
+    seen["feats_coarse"], seen["feats_fine"] = network.backbone(
+        recording.batch.features, recording.batch.pyramid
+    )
     for hook in hooks:
         hook.remove()
     output = network(recording.batch)
@@ -166,7 +167,9 @@ def _rows_apart(ours: tuple[Tensor, Tensor, Tensor], theirs: tuple[Tensor, Tenso
     """Differences of rows matched as a multiset, one to one."""
     if any(a.shape != b.shape for a, b in zip(ours, theirs, strict=True)):
         return [math.inf] * 3
-    rows = [np.hstack([p.numpy(), q.numpy(), w.numpy()[:, None]]).astype(np.float64) for p, q, w in (ours, theirs)]
+    rows = [
+        np.hstack([p.numpy(), q.numpy(), w.numpy()[:, None]]).astype(np.float64) for p, q, w in (ours, theirs)
+    ]
     _, partner = cKDTree(rows[1]).query(rows[0])
     if len(np.unique(partner)) < len(partner):  # equal rows: sorting pairs them up as well
         rows = [r[np.lexsort(np.round(r, 3).T)] for r in rows]
@@ -206,7 +209,11 @@ def _lgr_alone(recording: Recording) -> dict[str, float]:
     pair, row, column = chosen.nonzero(as_tuple=True)
     target, source = want["lgr.in.ref_patch_points"][pair, row], want["lgr.in.src_patch_points"][pair, column]
     pose = local_to_global(target, source, probability[chosen], pair, config.lgr)
-    expected = tuple(want[f"lgr.out.{name}"] for name in ("ref_corr_points", "src_corr_points", "corr_scores"))
+    expected = tuple(
+        want[f"lgr.out.{name}"] for name in ("ref_corr_points", "src_corr_points", "corr_scores")
+    )
     sets = _rows_apart((target, source, probability[chosen]), (expected[0], expected[1], expected[2]))
     names = ("lgr.out.ref_corr_points", "lgr.out.src_corr_points", "lgr.out.corr_scores")
-    return dict(zip(names, sets, strict=True)) | {"lgr.out.transform": _apart(pose.transform, want["lgr.out.transform"])}
+    return dict(zip(names, sets, strict=True)) | {
+        "lgr.out.transform": _apart(pose.transform, want["lgr.out.transform"])
+    }

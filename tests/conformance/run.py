@@ -27,7 +27,10 @@ def main(argv: list[str] | None = None) -> int:
     for name, value in found.items():
         print(f"{name:42s} {value:.2e}  {'ok' if value <= TOLERANCE else 'TOO FAR'}")
     failed = [name for name, value in found.items() if not value <= TOLERANCE]
-    print(f"{len(found) - len(failed)} of {len(found)} within {TOLERANCE:g}" + (f"; not: {failed}" if failed else ""))
+    print(
+        f"{len(found) - len(failed)} of {len(found)} within {TOLERANCE:g}"
+        + (f"; not: {failed}" if failed else "")
+    )
     return 1 if failed else 0
 
 

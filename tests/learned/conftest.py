@@ -10,7 +10,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
-
 from hybridreg.learned.batch import Batch, make_batch
 from hybridreg.learned.config import NetworkConfig
 from hybridreg.learned.network import RegistrationNetwork
