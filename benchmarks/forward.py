@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: MIT
-"""Time and memory of one forward pass by part: ``python benchmarks/forward.py [--size full] [--points 6000]``.
+"""Time and memory of one forward pass by part: ``python benchmarks/forward.py --size full --points 6000``.
 
-The pair is real where the data folder is there: the two clouds are cropped about the sensor until a 0.25 m grid
-holds the wanted number of points. Seconds are the median of the repeats, wall and processor; the multiply-adds
-are counted from the tensors' shapes, and the floor is their time at the speed of one large matrix product on the
-same threads, measured in the same run. Peak memory is the process's, so run one size a process.
+The pair is real where the data folder is there: the two clouds are cropped about the sensor until a 0.25 m
+grid holds the wanted number of points. Seconds are the median of the repeats, wall and processor; the
+multiply-adds
+are counted from the tensors' shapes, and the floor is their time at the speed of one large matrix product
+on the same threads, measured in the same run. Peak memory is the process's, so run one size a process.
 """
 
 from __future__ import annotations

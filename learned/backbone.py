@@ -3,11 +3,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import torch
 from hybridreg.learned.blocks import BlockPlan, ConvBlock, ResidualBlock, Surroundings, Unary, upsample
 from hybridreg.learned.config import BackboneConfig
-from hybridreg.learned.kpconv import Influence, kernel_influence
+from hybridreg.learned.kpconv import kernel_influence
 from hybridreg.learned.pyramid import Pyramid
 from torch import Tensor, nn
 
@@ -16,7 +18,8 @@ class KpconvFpn(nn.Module):
     """Encoder and decoder of any number of stages from one description.
 
     Stage 1 has a convolution and a residual block, every later stage a strided and two plain residual blocks;
-    widths double with the stage. The decoder stops at the fine stage. ``seed`` fixes the kernel points' turns.
+    widths double with the stage. The decoder stops at the fine stage. ``seed`` fixes the kernel points'
+    turns.
     """
 
     def __init__(self, config: BackboneConfig, seed: int = 0) -> None:
@@ -115,11 +118,7 @@ def _strided(pyramid: Pyramid, stage: int) -> Surroundings:
 
 
 def _with_influence(around: Surroundings, block: nn.Module) -> Surroundings:
+    assert isinstance(block, ConvBlock | ResidualBlock)
     conv = block.conv
-    assert isinstance(block, (ConvBlock, ResidualBlock)) and not isinstance(conv, Tensor)
-    influence: Influence = kernel_influence(
-        around.queries, around.supports, around.neighbors, conv.kernel, float(conv.sigma)
-    )
-    return Surroundings(
-        around.queries, around.supports, around.neighbors, around.lengths, around.support_lengths, influence
-    )
+    influence = kernel_influence(around.queries, around.supports, around.neighbors, conv.kernel, conv.sigma)
+    return replace(around, influence=influence)

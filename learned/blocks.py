@@ -104,7 +104,7 @@ class ConvBlock(nn.Module):
 
 
 class ResidualBlock(nn.Module):
-    """Bottleneck of unary, KPConv and unary, beside a shortcut that is max-pooled where the block is strided."""
+    """Bottleneck of unary, KPConv and unary, beside a shortcut, max-pooled where the block is strided."""
 
     def __init__(self, plan: BlockPlan, rng: np.random.Generator | None) -> None:
         super().__init__()

@@ -23,7 +23,8 @@ def circle_loss(target: Tensor, source: Tensor, overlap: Tensor, config: LossCon
     Returns
     -------
     Tensor
-        Scalar. Where no row or no column has both a positive and a negative, that half is 0 and keeps the graph.
+        Scalar. Where no row or no column has both a positive and a negative, that half is 0 and keeps the
+        graph.
     """
     # 1e-12 keeps the gradient of the root finite where two features agree.
     distance = (squared_distances(target, source, unit=True) + 1e-12).sqrt()
@@ -39,7 +40,8 @@ def circle_loss(target: Tensor, source: Tensor, overlap: Tensor, config: LossCon
 def _exponents(
     distance: Tensor, positive: Tensor, negative: Tensor, overlap: Tensor, config: LossConfig
 ) -> tuple[Tensor, Tensor]:
-    # Entries that are neither get weight 0, hence exponent 0: a constant in the sum, as in the published loss.
+    # Entries that are neither get weight 0, hence exponent 0: a constant in the sum, as in the published
+    # loss.
     fixed = distance.detach()
     pull_weight = (fixed - config.positive_optimal).clamp_min(0.0) * overlap.sqrt() * positive
     push_weight = (config.negative_optimal - fixed).clamp_min(0.0) * negative

@@ -10,7 +10,7 @@ from torch import Tensor, nn
 
 
 class GeoTransformerBlock(nn.Module):
-    """Exchange features within and between the clouds; with vanilla self-attention no geometry is looked at."""
+    """Exchange features within and between the clouds; vanilla self-attention looks at no geometry."""
 
     def __init__(self, config: TransformerConfig) -> None:
         super().__init__()

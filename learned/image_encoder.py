@@ -13,14 +13,14 @@ from torch.nn import functional as F
 
 @dataclass(frozen=True)
 class ImageFeatures:
-    """The image as the network sees it. Without an image, ``grid`` is None and ``null`` stands for all tokens."""
+    """The image as the network sees it; without one, ``grid`` is None and ``null`` stands for all tokens."""
 
     grid: Tensor | None  # (d, h, w)
     null: Tensor  # (1, d)
 
 
 class ResidualConv(nn.Module):
-    """Two 3x3 convolutions with group normalisation beside a 1x1 shortcut. (B, C, H, W) to (B, C', H/s, W/s)."""
+    """Two 3x3 convolutions beside a 1x1 shortcut: (B, C, H, W) to (B, C', H/s, W/s)."""
 
     def __init__(self, dim_in: int, dim_out: int, groups: int, stride: int = 1) -> None:
         super().__init__()
@@ -59,7 +59,7 @@ class ImageEncoder(nn.Module):
         self.null = nn.Parameter(torch.randn(1, config.dim) * 0.02)
 
     def forward(self, image: Tensor | None) -> ImageFeatures:
-        """(3, H, W) normalised, or None, to a (d, H/stride, W/stride) grid; in training some images are dropped."""
+        """(3, H, W) normalised, or None, to a (d, H/stride, W/stride) grid; training drops some images."""
         dropped = self.training and float(torch.rand(())) < self.dropout
         if image is None or dropped:
             return ImageFeatures(None, self.null)

@@ -20,8 +20,8 @@ _CHUNK_ENTRIES = 2**18
 class Influence:
     """The non-zero influences of a layer, one bag for each (kernel point, query) of a chunk of queries.
 
-    Only about a tenth of all (query, kernel point, neighbour) triples lie within the kernel points' reach, and
-    no shadow ever does: the sparse form does a tenth of the multiplications of the dense one.
+    Only about a tenth of all (query, kernel point, neighbour) triples lie within the kernel points' reach,
+    and no shadow ever does: the sparse form does a tenth of the multiplications of the dense one.
     """
 
     index: Tensor  # (E,) int64: support of each entry
@@ -160,7 +160,7 @@ class KPConv(nn.Module):
         neighbors: Tensor,
         influence: Influence | None = None,
     ) -> Tensor:
-        """(M, C_in) to (N, C_out); ``influence`` may be handed in by a stage that shares its kernel points."""
+        """(M, C_in) to (N, C_out); a stage that shares its kernel points hands ``influence`` in."""
         if influence is None:
             influence = kernel_influence(queries, supports, neighbors, self.kernel, self.sigma)
         return kernel_point_convolution(features, neighbors, influence, self.weights, self.bias)

@@ -67,7 +67,7 @@ def compute_losses(
     targets: Targets,
     config: LossConfig,
 ) -> Losses:
-    """All losses of a step: features (m, c), (n, c) of the kept superpoints, assignments of the patch pairs."""
+    """All losses of a step: features (m, c), (n, c) of kept superpoints, assignments of patch pairs."""
     fine = assignment_loss(
         assignment,
         pairs,

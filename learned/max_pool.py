@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Max-pooling over neighbours, slot by slot: no (queries, neighbours, channels) tensor, forward or backward."""
+"""Max-pooling over neighbours, slot by slot: no (queries, neighbours, channels) tensor either way."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ _CHUNK_VALUES = 2**16  # a quarter of a megabyte of the output at a time
 
 
 def max_pool(features: Tensor, neighbors: Tensor) -> Tensor:
-    """Largest feature of each query's neighbours, (M, C) and (N, k) to (N, C); a shadow (index M) counts as 0."""
+    """Largest feature of each query's neighbours, (M, C) and (N, k) to (N, C); a shadow (M) counts as 0."""
     return _MaxPool.apply(features, neighbors)
 
 

@@ -56,8 +56,8 @@ def gather_matches(
     target, source
         (N, 3), (M, 3) fine points in metres.
     config
-        ``topk``, ``confidence``, ``mutual``. When nothing passes, the threshold falls to 0.01; then mutual best
-        matches are taken without a threshold.
+        ``topk``, ``confidence``, ``mutual``. When nothing passes, the threshold falls to 0.01; then mutual
+        best matches are taken without a threshold.
     """
     strict = (config.topk, config.confidence, config.mutual)
     for topk, threshold, mutual in (

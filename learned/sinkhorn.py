@@ -53,8 +53,9 @@ def log_sinkhorn(scores: Tensor, rows: Tensor, columns: Tensor, alpha: Tensor, i
 def kernel_sinkhorn(scores: Tensor, rows: Tensor, columns: Tensor, alpha: Tensor, iterations: int) -> Tensor:
     """The same by products with ``exp(scores)``, for a tenth of the time.
 
-    The first iteration is done on logarithms and its potentials go into the kernel, which is then of the order of
-    the marginals whatever the scores: only their change has to fit float32. The pairs for which it does not are done again in the log form.
+    The first iteration is done on logarithms and its potentials go into the kernel, which is then of the
+    order of the marginals whatever the scores: only their change has to fit float32. The pairs for which it
+    does not are done again in the log form.
     """
     if len(scores) == 0 or iterations < 2:
         return log_sinkhorn(scores, rows, columns, alpha, iterations)

@@ -48,7 +48,8 @@ class StructureEmbedding(nn.Module):
         return embedding.add_(self._embed(self.angle, angles).amax(2))
 
     def _embed(self, layer: nn.Linear, values: Tensor) -> Tensor:
-        # The layer's columns are sorted to take all sines, then all cosines, instead of interleaving the values.
+        # The layer's columns are sorted to take all sines, then all cosines, instead of interleaving the
+        # values.
         half = len(self.frequency)
         weight = layer.weight.view(-1, half, 2).transpose(1, 2).reshape(-1, 2 * half)
         omega = values[..., None] * self.frequency
@@ -56,7 +57,7 @@ class StructureEmbedding(nn.Module):
 
 
 def neighbor_angles(anchors: Tensor, points: Tensor, nearest: Tensor) -> Tensor:
-    """Angles (b, n, k) in radians at each anchor (b, 3), between points (n, 3) and its neighbours (b, k, 3)."""
+    """Angles (b, n, k) in radians at anchors (b, 3), between points (n, 3) and neighbours (b, k, 3)."""
     to_point = (points[None] - anchors[:, None])[:, :, None]  # (b, n, 1, 3)
     to_near = (nearest - anchors[:, None])[:, None]  # (b, 1, k, 3)
     shape = torch.broadcast_shapes(to_point.shape, to_near.shape)

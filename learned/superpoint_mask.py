@@ -47,7 +47,7 @@ def keep_all(patches: Patches) -> Kept:
 
 
 def cap(kept: Kept, priority: Tensor, limit: int) -> Kept:
-    """At most ``limit`` superpoints, those of highest ``priority`` (n,) first: the structure embedding is n x n."""
+    """At most ``limit`` superpoints, by ``priority`` (n,): the structure embedding is n x n."""
     if len(kept.index) <= limit:
         return kept
     order = priority[kept.index].argsort(descending=True, stable=True)[:limit]

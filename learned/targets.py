@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What a network should have found, from the true pose: for training and evaluation only (methods 5.2, 7.2)."""
+"""What a network should have found, from the true pose: for training only (methods 5.2, 7.2)."""
 
 from __future__ import annotations
 
@@ -71,8 +71,8 @@ def node_overlaps(
 ) -> tuple[tuple[Tensor, Tensor], Tensor]:
     """Superpoint pairs with ``o_ij > 0``, row by row, and ``o_ij``.
 
-    ``o_ij`` is the mean of two shares: the points of patch i with a point of patch j within the radius, and the
-    other way round. All points must be in one frame.
+    ``o_ij`` is the mean of two shares: the points of patch i with a point of patch j within the radius,
+    and the other way round. All points must be in one frame.
     """
     pair_target, pair_source = _candidates(nodes, points, patches, radius)
     size = max(1, _CHUNK_VALUES // (patches[0].mask.shape[1] * patches[1].mask.shape[1]))

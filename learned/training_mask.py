@@ -1,14 +1,13 @@
 # SPDX-License-Identifier: MIT
-"""Which superpoints a training step keeps: jittered teacher forcing, later mixed with the prediction (methods 5.4)."""
+"""Which superpoints a training step keeps: jittered teacher forcing, later the prediction (methods 5.4)."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 import torch
-from torch import Tensor
-
 from hybridreg.learned.superpoint_mask import Kept, cap
+from torch import Tensor
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -17,12 +16,12 @@ class MaskJitter:
 
     drop_positive: float = 0.1  # share of the true superpoints left out
     keep_negative: float = 0.3  # share of the others kept
-    use_predicted: float = 0.0  # probability of the predicted mask and half the truth instead; 0.5 from epoch 5
+    use_predicted: float = 0.0  # probability of the predicted mask and half the truth; 0.5 from epoch 5
     threshold: float = 0.5
 
 
 def training_mask(
-    truth: Tensor, logits: Tensor, limit: int, jitter: MaskJitter, generator: torch.Generator
+    truth: Tensor, logits: Tensor, limit: int, jitter: MaskJitter, rng: torch.Generator
 ) -> Kept:
     """Superpoints of one cloud that this step keeps, at least one.
 
@@ -33,8 +32,8 @@ def training_mask(
     limit
         Most superpoints to keep, positives first.
     """
-    draw = torch.rand(len(truth), generator=generator).to(truth.device)
-    if float(torch.rand((), generator=generator)) < jitter.use_predicted:
+    draw = torch.rand(len(truth), generator=rng).to(truth.device)
+    if float(torch.rand((), generator=rng)) < jitter.use_predicted:
         keep = (torch.sigmoid(logits.detach()) > jitter.threshold) | (truth & (draw < 0.5))
     else:
         keep = torch.where(truth, draw >= jitter.drop_positive, draw < jitter.keep_negative)

@@ -4,8 +4,6 @@
 from __future__ import annotations
 
 import torch
-from torch import Tensor
-
 from hybridreg.learned.batch import Batch
 from hybridreg.learned.losses import Losses, compute_losses
 from hybridreg.learned.network import Encoding, RegistrationNetwork
@@ -13,6 +11,7 @@ from hybridreg.learned.omp import OverlapLogits
 from hybridreg.learned.superpoint_mask import Kept
 from hybridreg.learned.targets import Targets
 from hybridreg.learned.training_mask import MaskJitter, training_mask
+from torch import Tensor
 
 
 def training_losses(
@@ -39,19 +38,20 @@ def training_losses(
     overlap = network.predict_overlap(encoding)
     kept = _kept(network, encoding, overlap, targets, jitter or MaskJitter(), generator)
     features = network.attend(encoding, kept)
-    chosen = sample_target_pairs(targets, network.config.loss.positive_overlap, network.config.loss.targets, generator)
+    config = network.config.loss
+    chosen = sample_target_pairs(targets, config.positive_overlap, config.targets, generator)
     pairs = network.pair_up(encoding, targets.target[chosen], targets.source[chosen])
-    assignment = network.assign(encoding, pairs, "log", network.config.loss.training_sinkhorn_iterations)
-    return compute_losses(encoding, overlap, kept, features, pairs, assignment, targets, network.config.loss)
+    assignment = network.assign(encoding, pairs, "log", config.training_sinkhorn_iterations)
+    return compute_losses(encoding, overlap, kept, features, pairs, assignment, targets, config)
 
 
-def sample_target_pairs(targets: Targets, min_overlap: float, limit: int, generator: torch.Generator) -> Tensor:
-    """At most ``limit`` random true superpoint pairs that overlap by more than ``min_overlap``, as indices (B,).
+def sample_target_pairs(targets: Targets, min_overlap: float, limit: int, rng: torch.Generator) -> Tensor:
+    """Indices (B,) of at most ``limit`` random true superpoint pairs that overlap by over ``min_overlap``.
 
     Predicted pairs would teach the point matcher that mostly there is nothing to match.
     """
     good = (targets.overlap > min_overlap).nonzero()[:, 0]
-    order = torch.randperm(len(good), generator=generator)[:limit]
+    order = torch.randperm(len(good), generator=rng)[:limit]
     return good[order.to(good.device)]
 
 

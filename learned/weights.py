@@ -65,8 +65,8 @@ def _find(name_or_folder: str | os.PathLike[str]) -> Path:
             return folder
     known = sorted(path.parent.name for path in _SHIPPED.glob(f"*/{CONFIG_FILE}"))
     raise FileNotFoundError(
-        f"no {CONFIG_FILE} and {WEIGHTS_FILE} in {os.fspath(name_or_folder)!r}, and no shipped weights of that name; "
-        f"shipped are: {', '.join(known) or 'none'}"
+        f"no {CONFIG_FILE} and {WEIGHTS_FILE} in {os.fspath(name_or_folder)!r}, and no shipped weights "
+        f"of that name; shipped are: {', '.join(known) or 'none'}"
     )
 
 

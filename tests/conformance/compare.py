@@ -19,8 +19,8 @@ from plan import Recording
 from scipy.spatial import cKDTree
 from torch import Tensor
 
-# The log-assignment of a padded entry is minus infinity up to rounding: about -1e12, where neighbouring float32
-# numbers are 65536 apart. Both sides must be below this; their difference means nothing.
+# The log-assignment of a padded entry is minus infinity up to rounding: about -1e12, where neighbouring
+# float32 numbers are 65536 apart. Both sides must be below this; their difference means nothing.
 _PADDED = -1e6
 # Relative: some ten units in the last place of float32.
 _TIE = 5e-6
@@ -98,7 +98,7 @@ def _all_scores(recording: Recording, output: Output) -> Tensor:
 
 
 def _recorded_pairs(recording: Recording, output: Output) -> SuperpointMatches:
-    """Ours where they are the recorded set, else the recorded ones: what follows is then judged on its own."""
+    """Ours where they are the recorded set, else the recorded ones: what follows is judged on its own."""
     want, found = recording.values, output.superpoints
     target, source = want["out.ref_node_corr_indices"], want["out.src_node_corr_indices"]
     same = set(zip(target.tolist(), source.tolist(), strict=True)) == set(

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A recording: the network's configuration from its JSON, the batch and the expected values from its arrays."""
+"""A recording: the network's configuration from its JSON, batch and expected values from its arrays."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The network against the original, output by output, and the pyramid against the original's from raw points."""
+"""The network against the original, output by output, and the pyramid from raw points."""
 
 from __future__ import annotations
 
