@@ -11,6 +11,7 @@ from hybridreg.learned import kpconv
 from hybridreg.learned.batch import Batch
 from hybridreg.learned.network import RegistrationNetwork
 from hybridreg.learned.patch_pairs import size_chunks
+from hybridreg.learned.structure_embedding import StructureEmbedding
 from torch import nn
 
 
@@ -51,5 +52,11 @@ def _counter(counted: Counter[str], module: nn.Module) -> Any:
         assert isinstance(module, nn.Conv2d)
         counted["image"] += out.numel() * module.in_channels * module.kernel_size[0] * module.kernel_size[1]
 
-    by_kind = {nn.Linear: linear, kpconv.KPConv: convolution, nn.Conv2d: image}
+    def structure(_: nn.Module, args: tuple[Any, ...], out: torch.Tensor) -> None:
+        assert isinstance(module, StructureEmbedding)
+        # one product for the distance of each pair and one for each of its angles
+        products = 1 + min(module.angle_k, out.shape[0] - 1)
+        counted["structure embedding"] += out.numel() * module.distance.in_features * products
+
+    by_kind = {StructureEmbedding: structure, nn.Linear: linear, kpconv.KPConv: convolution, nn.Conv2d: image}
     return by_kind.get(type(module), lambda *_: None)  # type: ignore[call-overload]

@@ -182,7 +182,7 @@ def test_turning_the_source_turns_the_pose_of_frozen_features(
 def test_a_planted_truth_is_found_from_point_to_pose(
     pair: tuple[np.ndarray, np.ndarray], truth: np.ndarray
 ) -> None:
-    """With features that say where a point is in the common frame, everything after the backbone must work."""
+    """With features that say where a point is, everything after the backbone must work."""
     config = replace(
         named_config("nano"),
         transformer=TransformerConfig(hidden_dim=64, output_dim=64, heads=2, blocks=()),

@@ -136,7 +136,7 @@ def test_published_checkpoints_fit(name: str, tensors: int | None, parameters: i
 def test_a_checkpoint_with_code_in_it_is_refused(tmp_path: Path) -> None:
     file = tmp_path / "bad.pth.tar"
     torch.save({"model": {"a": Path("x")}}, file)
-    with pytest.raises(ValueError, match="cannot be read safely|read safely"):
+    with pytest.raises(ValueError, match="can be read safely"):
         load_official(file)
     with pytest.raises(FileNotFoundError):
         load_official(tmp_path / "none.pth.tar")
