@@ -25,13 +25,14 @@ import torch
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
+from multiply_adds import count_multiply_adds  # noqa: E402
+
 from hybridreg.learned.batch import Batch, make_batch  # noqa: E402
 from hybridreg.learned.config import NetworkConfig  # noqa: E402
 from hybridreg.learned.grid import grid_subsample  # noqa: E402
 from hybridreg.learned.lgr import local_to_global  # noqa: E402
 from hybridreg.learned.network import RegistrationNetwork  # noqa: E402
 from hybridreg.learned.sizes import named_config  # noqa: E402
-from multiply_adds import count_multiply_adds  # noqa: E402
 
 
 def real_cloud(name: str) -> torch.Tensor:

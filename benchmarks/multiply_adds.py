@@ -7,12 +7,13 @@ from collections import Counter
 from typing import Any
 
 import torch
+from torch import nn
+
 from hybridreg.learned import kpconv
 from hybridreg.learned.batch import Batch
 from hybridreg.learned.network import RegistrationNetwork
 from hybridreg.learned.patch_pairs import size_chunks
 from hybridreg.learned.structure_embedding import StructureEmbedding
-from torch import nn
 
 
 @torch.no_grad()

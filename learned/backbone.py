@@ -7,11 +7,12 @@ from dataclasses import replace
 
 import numpy as np
 import torch
+from torch import Tensor, nn
+
 from hybridreg.learned.blocks import BlockPlan, ConvBlock, ResidualBlock, Surroundings, Unary, upsample
 from hybridreg.learned.config import BackboneConfig
 from hybridreg.learned.kpconv import kernel_influence
 from hybridreg.learned.pyramid import Pyramid
-from torch import Tensor, nn
 
 
 class KpconvFpn(nn.Module):

@@ -8,11 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 import torch
+from torch import Tensor
+
 from hybridreg.learned.config import NetworkConfig
 from hybridreg.learned.image_input import image_tensor
 from hybridreg.learned.input_features import input_features
 from hybridreg.learned.pyramid import Pyramid, build_pyramid
-from torch import Tensor
 
 
 @dataclass(frozen=True, kw_only=True)

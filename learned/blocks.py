@@ -7,10 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 import torch
-from hybridreg.learned.kpconv import Influence, KPConv
-from hybridreg.learned.max_pool import max_pool
 from torch import Tensor, nn
 from torch.nn import functional as F
+
+from hybridreg.learned.kpconv import Influence, KPConv
+from hybridreg.learned.max_pool import max_pool
 
 _SLOPE = 0.1
 _EPS = 1e-5

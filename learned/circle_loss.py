@@ -4,10 +4,11 @@
 from __future__ import annotations
 
 import torch
-from hybridreg.learned.config import LossConfig
-from hybridreg.learned.distances import squared_distances
 from torch import Tensor
 from torch.nn import functional as F
+
+from hybridreg.learned.config import LossConfig
+from hybridreg.learned.distances import squared_distances
 
 
 def circle_loss(target: Tensor, source: Tensor, overlap: Tensor, config: LossConfig) -> Tensor:

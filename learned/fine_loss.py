@@ -3,11 +3,12 @@
 
 from __future__ import annotations
 
+from torch import Tensor
+
 from hybridreg.learned.blocks import pad_row
 from hybridreg.learned.distances import squared_distances
 from hybridreg.learned.patch_pairs import PatchPairs
 from hybridreg.learned.procrustes import apply_transform
-from torch import Tensor
 
 
 def assignment_loss(

@@ -3,10 +3,11 @@
 
 from __future__ import annotations
 
+from torch import Tensor, nn
+
 from hybridreg.learned.attention import AttentionLayer
 from hybridreg.learned.config import TransformerConfig
 from hybridreg.learned.structure_embedding import StructureEmbedding
-from torch import Tensor, nn
 
 
 class GeoTransformerBlock(nn.Module):

@@ -6,9 +6,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import torch
-from hybridreg.learned.config import ImageConfig
 from torch import Tensor, nn
 from torch.nn import functional as F
+
+from hybridreg.learned.config import ImageConfig
 
 
 @dataclass(frozen=True)

@@ -6,8 +6,9 @@ from __future__ import annotations
 from typing import Literal
 
 import torch
-from hybridreg.learned.pyramid import Pyramid
 from torch import Tensor
+
+from hybridreg.learned.pyramid import Pyramid
 
 _COLUMN = 4.0  # metres: edge of the columns whose lowest point is taken for the ground
 

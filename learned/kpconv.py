@@ -8,9 +8,10 @@ from dataclasses import dataclass
 
 import numpy as np
 import torch
-from hybridreg.learned.kernel_points import kernel_points
 from torch import Tensor, nn
 from torch.nn import functional as F
+
+from hybridreg.learned.kernel_points import kernel_points
 
 # Entries of (kernel points, queries, neighbours) looked at in one go: a megabyte, small enough for the cache.
 _CHUNK_ENTRIES = 2**18

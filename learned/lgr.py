@@ -6,9 +6,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import torch
+from torch import Tensor
+
 from hybridreg.learned.config import LgrConfig
 from hybridreg.learned.procrustes import apply_transform, weighted_procrustes
-from torch import Tensor
 
 _CHUNK_VOTES = 2**22
 

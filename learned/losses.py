@@ -6,6 +6,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import torch
+from torch import Tensor
+
 from hybridreg.learned.circle_loss import circle_loss
 from hybridreg.learned.config import LossConfig
 from hybridreg.learned.fine_loss import assignment_loss
@@ -15,7 +17,6 @@ from hybridreg.learned.omp import OverlapLogits
 from hybridreg.learned.patch_pairs import PatchPairs
 from hybridreg.learned.superpoint_mask import Kept
 from hybridreg.learned.targets import Targets
-from torch import Tensor
 
 
 @dataclass(frozen=True)

@@ -7,6 +7,9 @@ from dataclasses import dataclass
 from typing import Literal
 
 import torch
+from torch import Tensor, nn
+from torch.nn import functional as F
+
 from hybridreg.learned.backbone import KpconvFpn
 from hybridreg.learned.batch import Batch
 from hybridreg.learned.blocks import pad_row
@@ -22,8 +25,6 @@ from hybridreg.learned.sinkhorn import OptimalTransport
 from hybridreg.learned.superpoint_mask import Kept, cap, keep_all, keep_predicted
 from hybridreg.learned.superpoint_matching import SuperpointMatches, match_superpoints
 from hybridreg.learned.vgam import VisualGeometricAttention
-from torch import Tensor, nn
-from torch.nn import functional as F
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -6,11 +6,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import torch
+from torch import Tensor, nn
+
 from hybridreg.learned.attention import Attention, AttentionLayer
 from hybridreg.learned.config import OmpConfig
 from hybridreg.learned.image_encoder import ImageFeatures, pool_tokens
 from hybridreg.learned.positions import image_grid_encoding
-from torch import Tensor, nn
 
 
 @dataclass(frozen=True)

@@ -6,8 +6,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import torch
-from hybridreg.learned.patches import Patches
 from torch import Tensor
+
+from hybridreg.learned.patches import Patches
 
 # Values of one chunk's score matrices: half a megabyte stays in the second-level cache.
 _CHUNK_VALUES = 2**17

@@ -6,9 +6,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import torch
+from torch import Tensor
+
 from hybridreg.learned.config import MatchingConfig
 from hybridreg.learned.patch_pairs import PatchPairs
-from torch import Tensor
 
 
 @dataclass(frozen=True)

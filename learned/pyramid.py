@@ -6,10 +6,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import torch
+from torch import Tensor
+
 from hybridreg.learned.config import BackboneConfig
 from hybridreg.learned.grid import grid_subsample
 from hybridreg.learned.neighbors import count_neighbors, nearest_neighbor, radius_neighbors
-from torch import Tensor
 
 
 @dataclass(frozen=True, kw_only=True)

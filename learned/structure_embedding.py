@@ -6,10 +6,11 @@ from __future__ import annotations
 import math
 
 import torch
-from hybridreg.learned.distances import squared_distances
-from hybridreg.learned.positions import frequencies
 from torch import Tensor, nn
 from torch.nn import functional as F
+
+from hybridreg.learned.distances import squared_distances
+from hybridreg.learned.positions import frequencies
 
 # Values of the (rows, n, k, d) angle tensor computed in one go: 16 MB, whatever the number of superpoints.
 _CHUNK_VALUES = 2**22

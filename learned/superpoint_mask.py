@@ -8,9 +8,10 @@ from dataclasses import dataclass
 from typing import Literal
 
 import torch
+from torch import Tensor
+
 from hybridreg.learned.config import OmpConfig
 from hybridreg.learned.patches import Patches
-from torch import Tensor
 
 Fallback = Literal["none", "topk", "all"]
 _MIN_NODES = 4

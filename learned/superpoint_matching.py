@@ -6,8 +6,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import torch
-from hybridreg.learned.distances import squared_distances
 from torch import Tensor
+
+from hybridreg.learned.distances import squared_distances
 
 
 @dataclass(frozen=True)

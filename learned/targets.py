@@ -6,13 +6,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import torch
+from torch import Tensor
+
 from hybridreg.learned.blocks import pad_row
 from hybridreg.learned.config import NetworkConfig
 from hybridreg.learned.distances import squared_distances
 from hybridreg.learned.patches import Patches, build_patches
 from hybridreg.learned.procrustes import apply_transform
 from hybridreg.learned.pyramid import Pyramid
-from torch import Tensor
 
 _CHUNK_VALUES = 2**23
 _FAR = 1e12

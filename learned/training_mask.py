@@ -6,8 +6,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import torch
-from hybridreg.learned.superpoint_mask import Kept, cap
 from torch import Tensor
+
+from hybridreg.learned.superpoint_mask import Kept, cap
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -4,6 +4,8 @@
 from __future__ import annotations
 
 import torch
+from torch import Tensor
+
 from hybridreg.learned.batch import Batch
 from hybridreg.learned.losses import Losses, compute_losses
 from hybridreg.learned.network import Encoding, RegistrationNetwork
@@ -11,7 +13,6 @@ from hybridreg.learned.omp import OverlapLogits
 from hybridreg.learned.superpoint_mask import Kept
 from hybridreg.learned.targets import Targets
 from hybridreg.learned.training_mask import MaskJitter, training_mask
-from torch import Tensor
 
 
 def training_losses(

@@ -6,11 +6,12 @@ from __future__ import annotations
 import math
 
 import torch
+from torch import Tensor, nn
+
 from hybridreg.learned.attention import Attention, AttentionLayer, FeedForward, merge_heads, split_heads
 from hybridreg.learned.config import VgamConfig
 from hybridreg.learned.image_encoder import ImageFeatures, pool_tokens
 from hybridreg.learned.positions import PointPosition, image_grid_encoding
-from torch import Tensor, nn
 
 
 class VisualAttention(nn.Module):

@@ -10,13 +10,14 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import torch
+from safetensors import SafetensorError
+from safetensors.torch import load_file, save_file
+from torch import Tensor, nn
+
 from hybridreg.learned.config import NetworkConfig
 from hybridreg.learned.network import RegistrationNetwork
 from hybridreg.learned.official_names import official_name
 from hybridreg.learned.sizes import named_config
-from safetensors import SafetensorError
-from safetensors.torch import load_file, save_file
-from torch import Tensor, nn
 
 CONFIG_FILE, WEIGHTS_FILE = "config.json", "model.safetensors"
 _SHIPPED = Path(__file__).resolve().parent / "weights"

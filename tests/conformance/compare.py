@@ -7,6 +7,10 @@ import math
 
 import numpy as np
 import torch
+from plan import Recording
+from scipy.spatial import cKDTree
+from torch import Tensor
+
 from hybridreg.learned.circle_loss import circle_loss
 from hybridreg.learned.fine_loss import assignment_loss
 from hybridreg.learned.lgr import local_to_global
@@ -15,9 +19,6 @@ from hybridreg.learned.network import Output
 from hybridreg.learned.point_matching import mutual_top_k
 from hybridreg.learned.superpoint_matching import SuperpointMatches, match_superpoints
 from hybridreg.learned.targets import Targets, compute_targets
-from plan import Recording
-from scipy.spatial import cKDTree
-from torch import Tensor
 
 # The log-assignment of a padded entry is minus infinity up to rounding: about -1e12, where neighbouring
 # float32 numbers are 65536 apart. Both sides must be below this; their difference means nothing.

@@ -11,6 +11,8 @@ from typing import Any
 
 import numpy as np
 import torch
+from torch import Tensor
+
 from hybridreg.learned.batch import Batch
 from hybridreg.learned.config import (
     BackboneConfig,
@@ -23,7 +25,6 @@ from hybridreg.learned.config import (
 from hybridreg.learned.network import RegistrationNetwork
 from hybridreg.learned.pyramid import Pyramid
 from hybridreg.learned.weights import load_official_tensors
-from torch import Tensor
 
 
 @dataclass(frozen=True)

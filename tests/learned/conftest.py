@@ -10,11 +10,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
+from streets import moved, street, yaw
+
 from hybridreg.learned.batch import Batch, make_batch
 from hybridreg.learned.config import NetworkConfig
 from hybridreg.learned.network import RegistrationNetwork
 from hybridreg.learned.sizes import named_config
-from streets import moved, street, yaw
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.append(str(ROOT / "tests" / "conformance"))

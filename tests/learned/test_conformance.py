@@ -8,9 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
+from scipy.spatial import cKDTree
+
 from hybridreg.learned.grid import grid_subsample
 from hybridreg.learned.neighbors import radius_neighbors
-from scipy.spatial import cKDTree
 
 
 @pytest.fixture(scope="module")

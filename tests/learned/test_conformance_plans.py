@@ -13,6 +13,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
+from streets import moved, street, yaw
+
 from hybridreg.learned.batch import make_batch
 from hybridreg.learned.circle_loss import circle_loss
 from hybridreg.learned.fine_loss import assignment_loss
@@ -21,7 +23,6 @@ from hybridreg.learned.losses import overlap_matrix
 from hybridreg.learned.network import RegistrationNetwork
 from hybridreg.learned.official_names import official_name
 from hybridreg.learned.targets import compute_targets
-from streets import moved, street, yaw
 
 MARGINS = {"positive_margin": 0.1, "negative_margin": 1.4, "positive_optimal": 0.1, "negative_optimal": 1.4}
 

@@ -6,13 +6,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import torch
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
 from hybridreg.learned import kpconv
 from hybridreg.learned.blocks import PointGroupNorm, upsample
 from hybridreg.learned.kernel_points import kernel_points
 from hybridreg.learned.kpconv import kernel_influence, kernel_point_convolution
 from hybridreg.learned.max_pool import max_pool
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 
 def by_loops(queries, supports, neighbors, kernel, sigma, features, weights, bias):  # type: ignore[no-untyped-def]

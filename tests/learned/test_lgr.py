@@ -6,12 +6,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import torch
-from hybridreg.learned.config import LgrConfig
-from hybridreg.learned.lgr import local_to_global
-from hybridreg.learned.procrustes import apply_transform, weighted_procrustes
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
+
+from hybridreg.learned.config import LgrConfig
+from hybridreg.learned.lgr import local_to_global
+from hybridreg.learned.procrustes import apply_transform, weighted_procrustes
 
 
 def pose(seed: int) -> torch.Tensor:

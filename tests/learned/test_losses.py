@@ -6,6 +6,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import torch
+from scipy.spatial import cKDTree
+from streets import street
+
 from hybridreg.learned.batch import Batch, make_batch
 from hybridreg.learned.circle_loss import circle_loss
 from hybridreg.learned.config import LossConfig, NetworkConfig
@@ -18,8 +21,6 @@ from hybridreg.learned.sizes import named_config
 from hybridreg.learned.targets import compute_targets
 from hybridreg.learned.training_mask import MaskJitter, training_mask
 from hybridreg.learned.training_step import sample_target_pairs, training_losses
-from scipy.spatial import cKDTree
-from streets import street
 
 
 def test_overlaps_equal_brute_force(batch: Batch, nano: NetworkConfig, truth: np.ndarray) -> None:

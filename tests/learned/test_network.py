@@ -9,6 +9,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import torch
+from streets import moved, street, yaw
+
 from hybridreg.learned.batch import Batch, make_batch
 from hybridreg.learned.config import MatchingConfig, NetworkConfig, OmpConfig, TransformerConfig
 from hybridreg.learned.image_encoder import ImageEncoder
@@ -20,7 +22,6 @@ from hybridreg.learned.sizes import named_config
 from hybridreg.learned.structure_embedding import StructureEmbedding
 from hybridreg.learned.superpoint_mask import cap, keep_all, keep_predicted
 from hybridreg.learned.targets import compute_targets
-from streets import moved, street, yaw
 
 
 @torch.no_grad()

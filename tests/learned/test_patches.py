@@ -5,13 +5,14 @@ from __future__ import annotations
 
 import pytest
 import torch
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
 from hybridreg.learned import patch_pairs, patches
 from hybridreg.learned.patch_pairs import pair_patches, size_chunks
 from hybridreg.learned.patches import build_patches
 from hybridreg.learned.point_matching import mutual_top_k
 from hybridreg.learned.superpoint_matching import match_superpoints
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 
 @settings(max_examples=30, deadline=None)

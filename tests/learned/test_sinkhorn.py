@@ -5,9 +5,10 @@ from __future__ import annotations
 
 import pytest
 import torch
-from hybridreg.learned.sinkhorn import OptimalTransport, kernel_sinkhorn, log_sinkhorn
 from hypothesis import given, settings
 from hypothesis import strategies as st
+
+from hybridreg.learned.sinkhorn import OptimalTransport, kernel_sinkhorn, log_sinkhorn
 
 ALPHA = torch.tensor(1.0)
 

@@ -6,6 +6,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import torch
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from streets import street
+
 from hybridreg.learned import neighbors as module
 from hybridreg.learned.batch import make_batch
 from hybridreg.learned.config import BackboneConfig, NetworkConfig
@@ -13,9 +17,6 @@ from hybridreg.learned.grid import grid_subsample
 from hybridreg.learned.input_features import input_features
 from hybridreg.learned.neighbors import _radius_neighbors_tensor, nearest_neighbor, radius_neighbors
 from hybridreg.learned.pyramid import build_pyramid, calibrate_neighbor_limits
-from hypothesis import given, settings
-from hypothesis import strategies as st
-from streets import street
 
 PLAN = BackboneConfig(stages=4, voxel=0.5, init_dim=16, groups=4, neighbor_limits=(12, 12, 12, 12))
 

@@ -9,13 +9,14 @@ from pathlib import Path
 
 import pytest
 import torch
+from safetensors.torch import load_file, save_file
+
 from hybridreg.learned.batch import Batch
 from hybridreg.learned.config import BackboneConfig, NetworkConfig, TransformerConfig
 from hybridreg.learned.network import RegistrationNetwork
 from hybridreg.learned.official_names import official_name
 from hybridreg.learned.sizes import named_config
 from hybridreg.learned.weights import from_pretrained, load_official, save_pretrained
-from safetensors.torch import load_file, save_file
 
 
 @pytest.fixture
