@@ -110,7 +110,7 @@ def one_way(a: View, rows: NDArray[np.int64], b: View, T_b_a: Array, spacing: fl
     normals = a.normals[rows] @ T_b_a[:3, :3].T
     limit = _COVERED if b.image is not None else _SURROUNDED
     distance, match = b.tree.query(moved, distance_upper_bound=limit * spacing)
-    covered = distance < _COVERED * spacing
+    covered: Mask = np.asarray(distance) < _COVERED * spacing
     row = np.where(covered, match, 0)
     other = b.normals[row]
     across = np.abs(np.einsum("ni,ni->n", moved - b.points[row], other))
