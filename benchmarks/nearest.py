@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import hybridreg as hr
-from benchmarks.alternate import real_pairs, seconds
+from benchmarks.alternate import race, real_pairs
 from hybridreg._open3d import load_open3d
 from hybridreg.classical.nearest import nearest
 
@@ -85,11 +85,12 @@ def main() -> None:
         a, b = (hr.Fpfh().features(scene, side) for side in ("source", "target"))
         a, b = a[a.any(axis=1)], b[b.any(axis=1)]
         runs = {name: partial(method, a, b) for name, method in {"ours": ours, **PEERS}.items()}
-        taken = seconds(runs, options.rounds)
-        found = {tuple(row) for row in ours(a, b)}
+        timed = race(runs, options.rounds)
+        taken = {name: run.seconds for name, run in timed.items()}
+        found = {tuple(row) for row in timed["ours"].result}
         print(f"{labelled.pair.id}: {len(a)} x {len(b)}, ours {1e3 * taken['ours']:.0f} ms")
-        for name, method in PEERS.items():
-            theirs = {tuple(row) for row in method(a, b)}
+        for name in PEERS:
+            theirs = {tuple(row) for row in timed[name].result}
             print(
                 f"  {name:18s} {1e3 * taken[name]:6.0f} ms, ours / theirs {taken['ours'] / taken[name]:.2f}, "
                 f"agree {len(found & theirs) / len(theirs):.3f}",

@@ -14,7 +14,7 @@ import argparse
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.alternate import real_pairs, seconds
+from benchmarks.alternate import race, real_pairs
 from hybridreg._open3d import load_open3d
 from hybridreg.classical.voxel import voxel_centroids
 from hybridreg.resolution import default_voxel
@@ -32,13 +32,12 @@ def compare(points: Array, voxel: float) -> dict[str, float]:
         cloud = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(points))
         return np.asarray(cloud.voxel_down_sample(voxel).points)
 
-    return seconds(
-        {
-            "ours": lambda: voxel_centroids(points, voxel),
-            "open3d": open3d_from_numpy,
-            "open3d, converted before": lambda: ready.voxel_down_sample(voxel),
-        }
-    )
+    rivals = {
+        "ours": lambda: voxel_centroids(points, voxel),
+        "open3d": open3d_from_numpy,
+        "open3d, converted before": lambda: ready.voxel_down_sample(voxel),
+    }
+    return {name: timed.seconds for name, timed in race(rivals, rounds=7).items()}
 
 
 def main() -> None:

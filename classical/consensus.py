@@ -19,7 +19,8 @@ _CHUNK = 1 << 16
 # The expanded square cancels terms of the size of the extent's square. Where the threshold's square is larger
 # than this share of it, float32 keeps enough digits.
 _COARSE = 50.0 * float(np.finfo(np.float32).eps)
-_MOST_REFITS = 10
+# A refit that gains less than this share moves the pose by millimetres.
+_MOST_REFITS, _LEAST_GAIN = 10, 1e-3
 
 
 class Support(NamedTuple):
@@ -96,7 +97,9 @@ class Consensus:
             again = self.support(T)
             if again.score <= best.score:
                 return best
-            best = again
+            gained, best = again.score - best.score, again
+            if gained < _LEAST_GAIN * best.score:
+                return best
         return best
 
 
