@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import os
+import warnings
 from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
 from typing import Any
@@ -51,6 +52,18 @@ class Cross3DReg(ListedPairs):
         undo = "no" if inverted else "yes"
         cure = f"open the data set with inverted={undo}"
         super().__init__(entries, table, if_inverted=cure, fields=tuple(map(str, rows[0])))
+
+    def check(self) -> None:
+        super().check()
+        pair = self.read(0).pair
+        source, target = (azimuth.coverage(cloud.points).role for cloud in (pair.source, pair.target))
+        if (source, target) == ("spinning", "limited"):
+            warnings.warn(
+                f"{self.origin}: the list's source spins and its target is a fan, the paper's are the other way "
+                "round; the pairs are used as listed",
+                UserWarning,
+                stacklevel=2,
+            )
 
 
 @dataclass

@@ -63,7 +63,6 @@ def refined(drive: Drive, source: int, target: int) -> ListedPose:
     """
     from hybridreg.classical.icp import Icp
     from hybridreg.classical.voxel import VoxelGrid
-
     from hybridreg.matches import Pose
 
     M = drive.motion(source, target)

@@ -121,11 +121,15 @@ class ListedPairs(Dataset):
 
     def load(self, index: int) -> LabelledPair:
         if self._direction_open:
-            from hybridreg.data import direction
-
-            direction.check(self, str(self.origin), self.if_inverted)
+            self.check()
             self._direction_open = False
         return self.read(index)
+
+    def check(self) -> None:
+        """Refuse poses of the wrong direction; runs before the first pair is handed out."""
+        from hybridreg.data import direction
+
+        direction.check(self, str(self.origin), self.if_inverted)
 
     def fingerprint(self) -> str:
         digest = 0
