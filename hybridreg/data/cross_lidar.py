@@ -50,8 +50,8 @@ class CrossLidar(ListedPairs):
     Parameters
     ----------
     root : path
-        Holds one folder a sensor: clouds named by their frame (`velodyne/000000.bin`, `scans/000000.pcd`, or straight
-        in it) and `poses.txt` or `poses_kitti.txt`, line k for frame k: the upper three rows of T_world_sensor, one
+        Holds one folder a sensor: clouds named by their frame (`velodyne/000000.bin`, `scans/000000.pcd`, or straight in
+        it) and `poses.txt` or `poses_kitti.txt`, line k for frame k: the upper three rows of T_world_sensor, one
         world for both. A reconstruction from images must be in metres.
     source, target : str
         The sensors' folders below `root`.
@@ -82,7 +82,11 @@ class CrossLidar(ListedPairs):
     ) -> None:
         base = places.folder(Path(root), "the folder of both sensors")
         rule = Rule(min_dist=min_dist, min_overlap=min_overlap, radius=radius)
-        tracks = Track.read(base, source, source_calib), Track.read(base, target, target_calib)
+        # A reconstruction may have clouds for its keyframes alone.
+        tracks = [
+            Track.read(base, name, calib, whole=False)
+            for name, calib in ((source, source_calib), (target, target_calib))
+        ]
         super().__init__(pairs_of(base, *tracks, rule), base, if_inverted=CURE, overlap_radius=radius)
 
 
@@ -95,8 +99,16 @@ class Track:
     poses: Array
 
     @classmethod
-    def read(cls, base: Path, sensor: str, calib: str = "") -> Track:
-        """Find the clouds and poses of the folder `base/sensor`."""
+    def read(cls, base: Path, sensor: str, calib: str = "", whole: bool = True) -> Track:
+        """Find the clouds and poses of the folder `base/sensor`; `whole` refuses poses without a cloud.
+
+        Raises
+        ------
+        FileNotFoundError
+            No folder, clouds, poses or calibration; saying where they must lie.
+        ValueError
+            Clouds without poses, or the reverse where `whole`.
+        """
         folder = places.folder(base / sensor, f"the folder of the sensor {sensor}")
         clouds = next(folder / name for name in _CLOUD_FOLDERS if (folder / name).is_dir())
         file = places.first([folder / name for name in _POSE_FILES], f"the poses of the sensor {sensor}")
@@ -107,6 +119,12 @@ class Track:
         if max(frames) >= len(poses):
             raise ValueError(
                 f"{file}: {len(poses)} poses, but {clouds} has a frame {max(frames)}; write one line for each frame"
+            )
+        lacking = sorted(set(range(len(poses))) - set(frames))
+        if whole and lacking:
+            raise FileNotFoundError(
+                f"{len(lacking)} of {len(poses)} clouds of the sensor {sensor} are missing; the first must lie at "
+                f"{clouds}/{lacking[0]:06d}"
             )
         return cls(sensor, frames, poses)
 
