@@ -106,6 +106,10 @@ def _latin1(text: str, *_: Any) -> bytes:
     return text.encode("latin1")
 
 
+def _no_bytes() -> bytes:
+    return b""  # how Python 2's protocols spell an empty array's content
+
+
 _STAND_INS: dict[str, Any] = {
     "numpy.core.multiarray._reconstruct": _empty_array,
     "numpy.core.multiarray.scalar": _number,
@@ -113,4 +117,6 @@ _STAND_INS: dict[str, Any] = {
     "numpy.ndarray": _empty_array,
     "numpy.dtype": _dtype,
     "_codecs.encode": _latin1,
+    "__builtin__.bytes": _no_bytes,
+    "builtins.bytes": _no_bytes,
 }
