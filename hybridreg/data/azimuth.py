@@ -18,7 +18,7 @@ _SPINNING_DEG, _SPINNING_SHARE, _LIMITED_DEG = 300.0, 0.8, 200.0
 
 @dataclass(frozen=True)
 class Azimuth:
-    """Horizontal coverage about the origin: the angle from first to last direction, and the share within 360."""
+    """Horizontal coverage about the origin: from first to last direction, and the share of 360 deg."""
 
     span_deg: float
     share: float

@@ -20,13 +20,13 @@ _SENSORS = ("lidar", "array")  # the archive does not say which of the two spins
 class Cross3DReg(ListedPairs):
     """The paper's own data set; its limits are 2 deg and 0.5 m.
 
-    Nothing but the archive's folders is known for certain, so fields go by aliases (`hybridreg.data.records`), the
-    sensors' roles by geometry, and the first pair asked for has the direction of 20 poses checked by overlap.
+    Nothing but the archive's folders is known for certain, so fields go by aliases (`hybridreg.data.records`),
+    the sensors' roles by geometry, and the first pair asked for has the direction of 20 poses checked.
 
     Parameters
     ----------
     root : path
-        Holds `metadata/<split>.pkl` and `sequences/NN/{lidar,array,image}/NNNNNN.{ply,jpg}`; or the folder above.
+        Holds `metadata/<split>.pkl` and `sequences/NN/{lidar,array,image}/NNNNNN.{ply,jpg}`, or is above it.
     split : str
         "train", "val" or "test".
     inverted : bool
@@ -59,8 +59,8 @@ class Cross3DReg(ListedPairs):
         source, target = (azimuth.coverage(cloud.points).role for cloud in (pair.source, pair.target))
         if (source, target) == ("spinning", "limited"):
             warnings.warn(
-                f"{self.origin}: the list's source spins and its target is a fan, the paper's are the other way "
-                "round; the pairs are used as listed",
+                f"{self.origin}: the list's source spins and its target is a fan, the paper's are the "
+                "other way round; the pairs are used as listed",
                 UserWarning,
                 stacklevel=2,
             )

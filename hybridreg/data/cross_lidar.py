@@ -50,16 +50,16 @@ class CrossLidar(ListedPairs):
     Parameters
     ----------
     root : path
-        Holds one folder a sensor: clouds named by their frame (`velodyne/000000.bin`, `scans/000000.pcd`, or straight in
-        it) and `poses.txt` or `poses_kitti.txt`, line k for frame k: the upper three rows of T_world_sensor, one
-        world for both. A reconstruction from images must be in metres.
+        Holds one folder a sensor: clouds named by their frame (`velodyne/000000.bin`, `scans/000000.pcd`, or
+        straight in it) and `poses.txt` or `poses_kitti.txt`, line k for frame k: the upper three rows of
+        T_world_sensor, one world for both. A reconstruction from images must be in metres.
     source, target : str
         The sensors' folders below `root`.
     min_dist, min_overlap, radius : float
         `Rule`. With `min_overlap` the list is made once and kept as JSON in `root`.
     source_calib, target_calib : str
-        KITTI calibration below `root` whose `Tr` carries that sensor's points to the camera, where its poses are
-        the camera's.
+        KITTI calibration below `root` whose `Tr` carries that sensor's points to the camera, where its poses
+        are the camera's.
 
     Raises
     ------
@@ -118,13 +118,14 @@ class Track:
         frames = places.frames(clouds, f"clouds of the sensor {sensor}")
         if max(frames) >= len(poses):
             raise ValueError(
-                f"{file}: {len(poses)} poses, but {clouds} has a frame {max(frames)}; write one line for each frame"
+                f"{file}: {len(poses)} poses, but {clouds} has a frame {max(frames)}; "
+                "write one line for each frame"
             )
         lacking = sorted(set(range(len(poses))) - set(frames))
         if whole and lacking:
             raise FileNotFoundError(
-                f"{len(lacking)} of {len(poses)} clouds of the sensor {sensor} are missing; the first must lie at "
-                f"{clouds}/{lacking[0]:06d}"
+                f"{len(lacking)} of {len(poses)} clouds of the sensor {sensor} are missing; "
+                f"the first must lie at {clouds}/{lacking[0]:06d}"
             )
         return cls(sensor, frames, poses)
 

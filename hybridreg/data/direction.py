@@ -51,13 +51,13 @@ class Direction:
 
     def __str__(self) -> str:
         return (
-            f"mean overlap of {self.n} pairs at {self.radius:g} m: {self.as_given:.3f} under the poses as given, "
-            f"{self.inverted:.3f} under their inverses"
+            f"mean overlap of {self.n} pairs at {self.radius:g} m: {self.as_given:.3f} under the poses "
+            f"as given, {self.inverted:.3f} under their inverses"
         )
 
 
 def overlap(labelled: LabelledPair, radius: float, *, inverted: bool = False) -> float:
-    """Share of the source's points with a target point within `radius` metres, under the pose or its inverse."""
+    """Share of the source's points that meet a target point within `radius` metres, by the pose or its inverse."""
     pair, T = labelled.pair, labelled.T_target_source
     pose = lower_pose(se3.inverse(T) if inverted else T, pair)
     tree = cKDTree(_thinned(pair.target.points, _TARGET))

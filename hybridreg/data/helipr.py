@@ -12,8 +12,9 @@ from hybridreg.data.listed import ListedPairs
 
 
 class HeLiPr(ListedPairs):
-    """Frames of one LiDAR against frames of another, more than 10 m on; Avia against Ouster is the closest public
-    kin of Cross3DReg (without images).
+    """Frames of one LiDAR against frames of another, more than 10 m on.
+
+    Avia against Ouster is the closest public kin of Cross3DReg, without images.
 
     Parameters
     ----------

@@ -38,9 +38,10 @@ class Kitti(ListedPairs):
     split : str
         "train" (00 to 05), "val" (06, 07) or "test" (08 to 10).
     poses : str
-        "published": `metadata/<split>.pkl` of GeoTransformer, as it is. "own": `metadata/hybridreg-<split>.json`,
-        which `hybridreg datasets kitti-list` writes, composed `T_icp @ M`. "icp": Predator's `icp/S_i_j.npy`,
-        composed `M @ T_icp`. "odometry": `poses/NN.txt` without ICP. Empty: the first of them that is there.
+        "published": `metadata/<split>.pkl` of GeoTransformer, as it is. "own": what `hybridreg datasets
+        kitti-list` writes to `metadata/hybridreg-<split>.json`, composed `T_icp @ M`. "icp": Predator's
+        `icp/S_i_j.npy`, composed `M @ T_icp`. "odometry": `poses/NN.txt` without ICP. Empty: the first of them
+        that is there.
 
     Raises
     ------
@@ -71,8 +72,8 @@ def _first_there(base: Path, split: str) -> str:
     there = [name for name, mark in marks.items() if mark.exists()]
     if not there:
         raise FileNotFoundError(
-            f"a list of KITTI's pairs is missing; GeoTransformer's must lie at {marks['published']}, Predator's icp/ "
-            f"or KITTI's own poses/ in {base}"
+            f"a list of KITTI's pairs is missing; GeoTransformer's must lie at {marks['published']}, "
+            f"Predator's icp/ or KITTI's own poses/ in {base}"
         )
     return there[0]
 

@@ -61,8 +61,8 @@ class Drive:
         scans = places.frames(self.folder / "velodyne", f"the scans of KITTI's sequence {name[:2]}")
         if set(scans) != set(range(len(poses))):
             raise ValueError(
-                f"{file}: {len(poses)} poses, but {len(scans)} scans numbered {min(scans)} to {max(scans)} in "
-                f"{self.folder / 'velodyne'}; unpack KITTI's velodyne archive again, it must be whole"
+                f"{file}: {len(poses)} poses, but {len(scans)} scans numbered {min(scans)} to {max(scans)} "
+                f"in {self.folder / 'velodyne'}; unpack KITTI's velodyne archive again, it must be whole"
             )
         return poses
 

@@ -58,8 +58,8 @@ def walk(base: Path, split: str) -> Iterator[tuple[int, int, int]]:
 def refined(drive: Drive, source: int, target: int) -> ListedPose:
     """The pose of two scans: point-to-point ICP within 0.2 m on a 0.1 m grid, started at the odometry M.
 
-    ICP runs from M on, so its correction is multiplied on the left: `T = T_icp @ M`. The lineage's `M @ T_icp`
-    turns the correction about the wrong frame (FCGF issue 65).
+    ICP runs from M on, so its correction is multiplied on the left: `T = T_icp @ M`. The lineage's
+    `M @ T_icp` applies the correction in the wrong frame (FCGF issue 65).
     """
     from hybridreg.classical.icp import Icp
     from hybridreg.classical.voxel import VoxelGrid

@@ -72,8 +72,8 @@ class ListedPairs(Dataset):
     origin : path
         What the list came from, for messages.
     if_inverted : str
-        Where nobody has vouched for the poses' direction: what to do if they prove inverted. The first pair asked
-        for then has up to 20 pairs' poses compared with their inverses (`hybridreg.data.direction`).
+        Where nobody has vouched for the poses' direction: what to do if they prove inverted. The first pair
+        asked for then has up to 20 pairs' poses compared with their inverses (`hybridreg.data.direction`).
     overlap_radius : float
         Metres within which two points count as the same place: 0.5 outdoors.
     fields : tuple of str
@@ -106,7 +106,7 @@ class ListedPairs(Dataset):
 
     @classmethod
     def from_text(cls, text: str) -> ListedPairs:
-        """Open a loader by "PATH" or "PATH#option,name=value"; options are its constructor's, in their order."""
+        """Open a loader by "PATH" or "PATH#option,name=value"; options are its constructor's, in order."""
         loader: Callable[..., ListedPairs] = cls
         path, options = spelling.parse(text, inspect.signature(loader))
         return loader(path, **options)

@@ -67,8 +67,8 @@ class _Forbidden(Exception):
 class PlainUnpickler(pickle.Unpickler):
     """Knows the few names that pickled numpy arrays need, and stands in for them with functions of its own.
 
-    So it matters neither under which name numpy filed them (`numpy.core` until 1.26, `numpy._core` from 2.0) nor
-    what the real ones could be talked into.
+    So it matters neither under which name numpy filed them (`numpy.core` until 1.26, `numpy._core` from 2.0)
+    nor what the real ones could be talked into.
     """
 
     def __init__(self, stream: io.BytesIO) -> None:

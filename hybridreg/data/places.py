@@ -57,7 +57,7 @@ def frames(path: Path, what: str) -> dict[int, Path]:
 
 
 class Shelf:
-    """Which files there are, asked folder by folder: a list of ten thousand clouds costs a few reads, not so many."""
+    """Which files there are, asked folder by folder: ten thousand clouds cost a few reads."""
 
     def __init__(self) -> None:
         self._names: dict[Path, frozenset[str]] = {}
@@ -88,5 +88,6 @@ def refuse_missing(wanted: Iterable[Path], what: str) -> None:
     missing = [path for path in paths if not shelf.has(path)]
     if missing:
         raise FileNotFoundError(
-            f"{len(missing)} of {len(paths)} files that {what} names are missing; the first must lie at {missing[0]}"
+            f"{len(missing)} of {len(paths)} files that {what} names are missing; "
+            f"the first must lie at {missing[0]}"
         )

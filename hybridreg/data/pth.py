@@ -22,7 +22,7 @@ _OLD_FORMAT = 0x1950A86A20F9469CFC6C
 def read_pth(path: Path) -> NDArray[np.float64]:
     """Points (N, 3) of a `.pth` file that holds an array or a tensor, without running what it carries.
 
-    The published fragments are numpy arrays, for which PyTorch's own safe reader has no use; tensors go to it.
+    The published fragments are numpy arrays, which PyTorch's own safe reader refuses; tensors go to it.
 
     Raises
     ------

@@ -14,8 +14,8 @@ _TRUTH = {"yes": True, "true": True, "no": False, "false": False}
 def parse(text: str, signature: inspect.Signature) -> tuple[str, dict[str, Any]]:
     """The path, and the options as keyword arguments of `signature`, whose first parameter is the path.
 
-    A bare word is the value of the next parameter in order, or switches on the flag of that name; the type of a
-    value follows from the parameter's default.
+    A bare word is the value of the next parameter in order, or switches on the flag of that name; the type of
+    a value follows from the parameter's default.
 
     Raises
     ------

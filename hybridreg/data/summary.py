@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What a data set holds, measured: poses, overlaps, kinds of sensors, and whether the poses point the right way."""
+"""What a data set holds, measured: motions, overlaps, kinds of sensors, the poses' direction."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ _CURE = "turn them round: they must map source points to target points"
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Summary:
-    """Facts of a data set; those of the clouds are of the pairs that were read, those of the poses of all where the
-    data set knows them without reading.
+    """Facts of a data set: of its clouds, over the pairs that were read; of its poses, over all pairs where they
+    are known without reading.
 
     Attributes
     ----------
@@ -105,6 +105,13 @@ class _Seen:
             overlap=overlap(labelled, radius),
             inverse_overlap=overlap(labelled, radius, inverted=True),
             has_image=labelled.pair.image is not None,
-            roles={side: (c.sensor, azimuth.coverage(c.points).role) for side, c in clouds.items()},
+            roles={
+                side: (_sensor(labelled, side), azimuth.coverage(c.points).role) for side, c in clouds.items()
+            },
             points={side: len(c) for side, c in clouds.items()},
         )
+
+
+def _sensor(labelled: LabelledPair, side: str) -> str:
+    cloud = getattr(labelled.pair, side)
+    return str(cloud.sensor or labelled.pair.meta.get(f"{side}_sensor", ""))

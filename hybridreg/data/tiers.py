@@ -21,8 +21,8 @@ class Tiers(ListedPairs):
     Parameters
     ----------
     root : path
-        Holds `tiers_indoorNN/<sensor>/scans/NNNNNN.pcd` and `tiers_indoorNN/<sensor>/poses_kitti.txt`; sequence 09 is
-        left out.
+        Holds `tiers_indoorNN/<sensor>/scans/NNNNNN.pcd` and `tiers_indoorNN/<sensor>/poses_kitti.txt`;
+        sequence 09 is left out.
     source, target : str
         "vel16", "os1_64", "os0_128", "avia".
     min_dist, min_overlap, radius : float

@@ -95,7 +95,9 @@ def test_summary_measures_all_poses_but_reads_few_pairs(tmp_path: Path) -> None:
     found = summarise(open_dataset(tree.spelled), n=1)
     assert (found.n_pairs, found.n_read) == (2, 1)
     assert len(found.translation_m) == 2
-    assert np.allclose(found.translation_m, [np.linalg.norm(T[:3, 3]) for T in tree.truth.values()], atol=1e-6)
+    assert np.allclose(
+        found.translation_m, [np.linalg.norm(T[:3, 3]) for T in tree.truth.values()], atol=1e-6
+    )
     assert found.roles["source"].most_common(1)[0][0] == ("Avia", "limited")
     with pytest.raises(ValueError, match="0 pairs"):
         summarise([])

@@ -102,7 +102,7 @@ def relative(poses: Array, source: int, target: int) -> Array:
 
 
 def kitti(root: Path) -> Tree:
-    """Split val (06, 07), poses by odometry; frame 11 is the first beyond 10 m from frame 0, and 22 from 11."""
+    """Split val (06, 07), poses by odometry; 11 is the first frame beyond 10 m from 0, and 22 from 11."""
     truth = {}
     for number, turn in ((6, 1.5), (7, -1.0)):
         poses = way(23, turn_deg=turn)
@@ -113,7 +113,7 @@ def kitti(root: Path) -> Tree:
 
 
 def kitti_published(root: Path) -> Tree:
-    """GeoTransformer's archive: clouds downsampled to `.npy`, cloud 0 the target, the transform from 1 to 0."""
+    """GeoTransformer's archive: clouds in `.npy`, cloud 0 the target, the transform from 1 to 0."""
     poses, rows, truth = way(21), [], {}
     for source, target in ((0, 9), (10, 19)):
         for frame in (source, target):

@@ -95,7 +95,7 @@ def test_more_clouds_than_poses(tmp_path: Path) -> None:
     tree = loader_trees.helipr(tmp_path)
     file = tree.root / "Avia" / "poses.txt"
     file.write_text("".join(file.read_text().splitlines(keepends=True)[:20]))
-    with pytest.raises(ValueError, match="20 poses, but .* has a frame 23"):
+    with pytest.raises(ValueError, match=r"20 poses, but .* has a frame 23"):
         HeLiPr(tree.root)
 
 

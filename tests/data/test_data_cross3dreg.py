@@ -81,7 +81,10 @@ def test_rotation_and_translation_apart(archive: Path) -> None:
 
 def test_paths_of_the_authors_machine(archive: Path) -> None:
     def elsewhere(row: dict[str, Any]) -> dict[str, Any]:
-        there = {"pcd0": "/home/someone/Cross3DReg/" + row["pcd0"], "pcd1": "D:\\data\\" + row["pcd1"].replace("/", "\\")}
+        there = {
+            "pcd0": "/home/someone/Cross3DReg/" + row["pcd0"],
+            "pcd1": "D:\\data\\" + row["pcd1"].replace("/", "\\"),
+        }
         return {**row, **there}
 
     relist(archive, elsewhere)
@@ -109,7 +112,7 @@ def test_no_fan_is_told(tmp_path: Path) -> None:
     drive = root / "sequences" / "08"
     for file in (drive / "lidar").iterdir():
         shutil.copy(file, drive / "array" / file.name)
-    with pytest.raises(ValueError, match="neither lidar nor array of .* is a fan; name the clouds"):
+    with pytest.raises(ValueError, match=r"neither lidar nor array of .* is a fan; name the clouds"):
         Cross3DReg(root)
 
 
@@ -170,14 +173,18 @@ def test_a_spinning_source_is_warned_of(archive: Path) -> None:
 
 
 def test_missing_list_is_told(archive: Path) -> None:
-    with pytest.raises(FileNotFoundError, match="list of the pairs of train is missing; it must lie at") as caught:
+    with pytest.raises(
+        FileNotFoundError, match="list of the pairs of train is missing; it must lie at"
+    ) as caught:
         Cross3DReg(archive, split="train")
     assert str(archive / "metadata" / "train.pkl") in str(caught.value)
 
 
 def test_rows_without_what_is_needed(archive: Path) -> None:
     for lost, told in (("seq_id", "sequence"), ("pcd1", "neither|fields"), ("transform", "transform")):
-        relist(archive, lambda row, lost=lost: {k: v for k, v in row.items() if k not in (lost, "frame1")}, "val")
+        relist(
+            archive, lambda row, lost=lost: {k: v for k, v in row.items() if k not in (lost, "frame1")}, "val"
+        )
         with pytest.raises(ValueError, match=told) as caught:
             Cross3DReg(archive, split="val")
         assert "val.pkl, pair 0" in str(caught.value)
@@ -192,5 +199,7 @@ def test_the_same_pair_twice_is_refused(archive: Path) -> None:
 
 def test_lost_clouds_are_counted(archive: Path) -> None:
     shutil.rmtree(archive / "sequences" / "08" / "lidar")
-    with pytest.raises(FileNotFoundError, match="3 of 9 files that .* names are missing; the first must lie at"):
+    with pytest.raises(
+        FileNotFoundError, match=r"3 of 9 files that .* names are missing; the first must lie at"
+    ):
         Cross3DReg(archive)

@@ -58,7 +58,9 @@ def listed(root: Path, inverted: bool = False, if_inverted: str = "turn them") -
     from hybridreg.data import HeLiPr
 
     entries = [
-        dataclasses.replace(e, T_target_source=se3.inverse(e.T_target_source) if inverted else e.T_target_source)
+        dataclasses.replace(
+            e, T_target_source=se3.inverse(e.T_target_source) if inverted else e.T_target_source
+        )
         for e in HeLiPr(tree.root).entries
     ]
     return ListedPairs(entries, tree.root, if_inverted=if_inverted)
@@ -75,7 +77,9 @@ def test_right_poses_pass(tmp_path: Path) -> None:
 def test_inverted_poses_are_refused_with_both_figures(tmp_path: Path) -> None:
     pairs = listed(tmp_path, inverted=True)
     for _ in range(2):  # and not just the first time
-        with pytest.raises(ValueError, match="under their inverses; the poses seem to map target to source, turn"):
+        with pytest.raises(
+            ValueError, match="under their inverses; the poses seem to map target to source, turn"
+        ):
             pairs[0]
     assert len(pairs.read(0).pair.source) > 0
 

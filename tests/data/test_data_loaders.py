@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What every loader promises, on a small tree in its layout: truths, laziness, pickling, one clear sentence."""
+"""What every loader promises, on a small tree in its layout: truths, laziness, pickling, clear words."""
 
 from __future__ import annotations
 
@@ -48,9 +48,7 @@ def test_layout_is_recognised_without_a_name(written: Tree) -> None:
     assert by_place.ids == by_name.ids
 
 
-def test_no_cloud_is_read_before_it_is_asked_for(
-    written: Tree, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_no_cloud_is_read_before_it_is_asked_for(written: Tree, monkeypatch: pytest.MonkeyPatch) -> None:
     open_dataset(written.spelled)  # whatever is measured once and kept
     monkeypatch.setattr(listed, "read_points", _refuse)
     monkeypatch.setattr(listed, "read_pth", _refuse)
@@ -95,7 +93,7 @@ def test_missing_folder_is_told(copied: Tree) -> None:
 def test_empty_folder_is_told(copied: Tree) -> None:
     shutil.rmtree(copied.root)
     copied.root.mkdir()
-    with pytest.raises(FileNotFoundError, match="missing.*must") as caught:
+    with pytest.raises(FileNotFoundError, match=r"missing.*must") as caught:
         open_dataset(copied.spelled)
     assert str(copied.root) in str(caught.value)
 

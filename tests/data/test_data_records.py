@@ -155,7 +155,10 @@ def test_spelled_options(text: str, options: dict[str, Any]) -> None:
 @pytest.mark.parametrize(
     ("text", "told"),
     [
-        ("/data#colour=red", "'colour=red' is no option; there are split=test, min_dist=10.0, inverted=False"),
+        (
+            "/data#colour=red",
+            "'colour=red' is no option; there are split=test, min_dist=10.0, inverted=False",
+        ),
         ("/data#val,5,6", "'6' is no option"),
         ("/data#min_dist=far", "min_dist='far' must be a number such as 10.0"),
         ("/data#inverted=perhaps", "must be yes or no"),

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
@@ -15,7 +17,9 @@ def positions(seed: int, n: int, step: float) -> np.ndarray:
     rng = np.random.default_rng(seed)
     heading = np.cumsum(rng.normal(0, 0.1, n))
     speed = step * rng.uniform(0, 2, n) * (rng.random(n) > 0.2)
-    return np.cumsum(np.column_stack([np.cos(heading), np.sin(heading), 0 * heading]) * speed[:, None], axis=0)
+    return np.cumsum(
+        np.column_stack([np.cos(heading), np.sin(heading), 0 * heading]) * speed[:, None], axis=0
+    )
 
 
 def pairs_by_hand(places: np.ndarray, distance: float) -> list[tuple[int, int]]:
@@ -56,7 +60,7 @@ def test_a_jump_leaves_a_frame_alone() -> None:
 @given(seed=st.integers(0, 10_000), min_dist=st.sampled_from([0.0, 2.0, 10.0]), gap=st.integers(2, 9))
 def test_pairs_across_are_as_near_as_the_rule_lets_them(seed: int, min_dist: float, gap: int) -> None:
     source = positions(seed, 120, 0.8)
-    target = source + [0.3, -0.2, 0.1]
+    target = source + np.array([0.3, -0.2, 0.1])
     there = [n for n in range(120) if n % gap]  # some clouds of the target are not there
     pairs = pairs_across(source, target, range(120), there, min_dist)
     for i, j in pairs:
@@ -65,7 +69,7 @@ def test_pairs_across_are_as_near_as_the_rule_lets_them(seed: int, min_dist: flo
         assert np.linalg.norm(target[j] - source[i]) >= min_dist
         nearer = [k for k in there if i <= k < j]
         assert all(np.linalg.norm(target[k] - source[i]) < min_dist for k in nearer)
-    assert all(i < k and j <= k for (i, j), (k, _) in zip(pairs, pairs[1:], strict=False))
+    assert all(i < k and j <= k for (i, j), (k, _) in pairwise(pairs))
 
 
 def test_pairs_across_of_one_frame() -> None:
