@@ -46,8 +46,8 @@ def open_dataset(text: str | os.PathLike[str]) -> Sequence[LabelledPair]:
     Parameters
     ----------
     text : path of a folder, or "name:rest"
-        A folder is a folder of pairs or one of the layouts that `hybridreg.data.layouts` knows. `rest` is what
-        the loader of that name takes: a path for most, with options after a hash ("kitti:PATH#val").
+        A folder is a folder of pairs or one of the layouts that `hybridreg.data.layouts` knows. `rest` is
+        what the loader of that name takes: a path for most, with options after a hash ("kitti:PATH#val").
 
     Raises
     ------

@@ -20,7 +20,7 @@ _SENSORS = ("lidar", "array")  # the archive does not say which of the two spins
 class Cross3DReg(ListedPairs):
     """The paper's own data set; its limits are 2 deg and 0.5 m.
 
-    Nothing but the archive's folders is known for certain, so fields go by aliases (`hybridreg.data.records`),
+    Nothing but the archive's folders is known for certain: fields go by aliases (`hybridreg.data.records`),
     the sensors' roles by geometry, and the first pair asked for has the direction of 20 poses checked.
 
     Parameters

@@ -83,11 +83,11 @@ class CrossLidar(ListedPairs):
         base = places.folder(Path(root), "the folder of both sensors")
         rule = Rule(min_dist=min_dist, min_overlap=min_overlap, radius=radius)
         # A reconstruction may have clouds for its keyframes alone.
-        tracks = [
-            Track.read(base, name, calib, whole=False)
-            for name, calib in ((source, source_calib), (target, target_calib))
-        ]
-        super().__init__(pairs_of(base, *tracks, rule), base, if_inverted=CURE, overlap_radius=radius)
+        sources = Track.read(base, source, source_calib, whole=False)
+        targets = Track.read(base, target, target_calib, whole=False)
+        super().__init__(
+            pairs_of(base, sources, targets, rule), base, if_inverted=CURE, overlap_radius=radius
+        )
 
 
 @dataclass(frozen=True, eq=False)

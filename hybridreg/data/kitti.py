@@ -40,8 +40,8 @@ class Kitti(ListedPairs):
     poses : str
         "published": `metadata/<split>.pkl` of GeoTransformer, as it is. "own": what `hybridreg datasets
         kitti-list` writes to `metadata/hybridreg-<split>.json`, composed `T_icp @ M`. "icp": Predator's
-        `icp/S_i_j.npy`, composed `M @ T_icp`. "odometry": `poses/NN.txt` without ICP. Empty: the first of them
-        that is there.
+        `icp/S_i_j.npy`, composed `M @ T_icp`. "odometry": `poses/NN.txt` without ICP. Empty: the first that is
+        there.
 
     Raises
     ------

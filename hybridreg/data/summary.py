@@ -24,8 +24,8 @@ _CURE = "turn them round: they must map source points to target points"
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Summary:
-    """Facts of a data set: of its clouds, over the pairs that were read; of its poses, over all pairs where they
-    are known without reading.
+    """Facts of a data set: of its clouds, over the pairs that were read; of its poses, over all pairs where
+    they are known without reading.
 
     Attributes
     ----------

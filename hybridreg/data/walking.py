@@ -40,7 +40,7 @@ def kitti_pairs(positions: Array, distance: float = 10.0) -> list[tuple[int, int
 def pairs_across(
     source: Array, target: Array, sources: Collection[int], targets: Collection[int], min_dist: float
 ) -> list[tuple[int, int]]:
-    """Pairs of two sensors on one drive: of source frame i, the first target frame j >= i at least `min_dist` off.
+    """Pairs of two sensors on one drive: with frame i goes the first j >= i at least `min_dist` off.
 
     Parameters
     ----------

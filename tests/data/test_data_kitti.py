@@ -169,7 +169,7 @@ def test_a_scan_too_few_is_refused(tree: Tree) -> None:
 def test_what_odometry_needs_is_told(lost: str, tree: Tree) -> None:
     place = tree.root / "sequences" / "07" / lost
     shutil.rmtree(place) if place.is_dir() else place.unlink()
-    with pytest.raises(FileNotFoundError, match="of KITTI's sequence 07 is missing|are missing") as caught:
+    with pytest.raises(FileNotFoundError, match=r"of KITTI's sequence 07 is missing|are missing") as caught:
         Kitti(tree.root, "val")
     assert str(place) in str(caught.value)
 

@@ -123,7 +123,7 @@ def test_the_hostile_file_would_have_run(tmp_path: Path) -> None:
 
 
 def test_a_pickle_cannot_bend_the_readers_own_helpers(tmp_path: Path) -> None:
-    # BUILD with (None, {...}) sets attributes of what lies on the stack, here of the stand-in for numpy.dtype.
+    # BUILD with (None, {...}) sets attributes of what lies on the stack: of the stand-in for numpy.dtype.
     bend = b"\x80\x02cnumpy\ndtype\n(N}U\x0c__defaults__(I1\ntstb."
     for _ in range(2):
         with contextlib.suppress(ValueError):
