@@ -8,7 +8,8 @@ from hybridreg.data.dataset import Dataset
 from hybridreg.data.folder import PairFolder
 from hybridreg.data.helipr import HeLiPr
 from hybridreg.data.kitti import Kitti
-from hybridreg.data.listed import ListedPairs, PairFiles
+from hybridreg.data.listed import ListedPairs
+from hybridreg.data.pair_files import PairFiles
 from hybridreg.data.starts import YawStarts, yaw_starts
 from hybridreg.data.threedcsr import ThreeDCsr
 from hybridreg.data.threedmatch import ThreeDMatch

@@ -7,11 +7,11 @@ import os
 import warnings
 from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
-from typing import Any
 
 from hybridreg import se3
 from hybridreg.data import azimuth, places, records
-from hybridreg.data.listed import ListedPairs, PairFiles, read_scan
+from hybridreg.data.listed import ListedPairs
+from hybridreg.data.pair_files import PairFiles, read_scan
 from hybridreg.io.faults import fault
 
 _SENSORS = ("lidar", "array")  # the archive does not say which of the two spins
@@ -73,20 +73,19 @@ class _Archive:
     _fan: str = ""
 
     def entry(self, row: records.Record, label: str, inverted: bool) -> PairFiles:
-        sequence = _number(records.need(row, records.SEQUENCE, label), label)
+        sequence = records.number(row, records.SEQUENCE, label)
         source, target = (
             self._cloud(row, side, sequence, label)
             for side in ((records.SOURCE, records.SOURCE_FRAME), (records.TARGET, records.TARGET_FRAME))
         )
         T = records.transform_of(row, label)
-        overlap = records.find(row, ("overlap",))
         return PairFiles(
             id=f"{sequence:02d}/{source.stem}-{target.stem}",
             source=source,
             target=target,
             image=self._image(row, sequence, (source.stem, target.stem)),
             T_target_source=se3.inverse(T) if inverted else T,
-            overlap=None if overlap is None else float(overlap),
+            overlap=records.overlap(row, label),
             source_sensor=source.parent.name,
             target_sensor=target.parent.name,
         )
@@ -98,7 +97,7 @@ class _Archive:
         named = records.find(row, listed)
         if named is not None:
             return self._place(str(named), places.CLOUDS)
-        frame = _number(records.need(row, listed + frames, label), label)
+        frame = records.number(row, frames, label)
         fan = self._fan = self._fan or self._which_is_the_fan(sequence, frame, label)
         spinning = next(name for name in _SENSORS if name != fan)
         folder = fan if listed == records.SOURCE else spinning
@@ -130,10 +129,3 @@ class _Archive:
         raise fault(
             label, f"names no clouds, and neither {' nor '.join(_SENSORS)} of {folder} is a fan", cure
         )
-
-
-def _number(value: Any, label: str) -> int:
-    digits = str(value).rpartition("_")[2].rpartition("/")[2].partition(".")[0]
-    if not digits.isdecimal():
-        raise fault(label, f"has {value!r} where a sequence's or a frame's number should be")
-    return int(digits)

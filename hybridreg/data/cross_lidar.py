@@ -13,8 +13,9 @@ from numpy.typing import NDArray
 
 from hybridreg import se3
 from hybridreg.data import places
-from hybridreg.data.listed import ListedPairs, PairFiles
+from hybridreg.data.listed import ListedPairs
 from hybridreg.data.overlapping import overlapping
+from hybridreg.data.pair_files import PairFiles
 from hybridreg.data.trajectories import read_calibration, read_poses
 from hybridreg.data.walking import pairs_across
 

@@ -57,7 +57,7 @@ class Direction:
 
 
 def overlap(labelled: LabelledPair, radius: float, *, inverted: bool = False) -> float:
-    """Share of the source's points that the pose, or its inverse, brings within `radius` of a target point."""
+    """Share of the source's points that the pose, or its inverse, brings within `radius` of the target."""
     pair, T = labelled.pair, labelled.T_target_source
     pose = lower_pose(se3.inverse(T) if inverted else T, pair)
     tree = cKDTree(_thinned(pair.target.points, _TARGET))

@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 
 from hybridreg.data import kitti_list, places, records
 from hybridreg.data.kitti_drives import SPLITS, Drive, base_of
-from hybridreg.data.listed import ListedPairs, PairFiles
+from hybridreg.data.listed import ListedPairs
+from hybridreg.data.pair_files import PairFiles
 from hybridreg.data.trajectories import rigid
 from hybridreg.io.faults import foreign_parser
 
@@ -40,8 +41,8 @@ class Kitti(ListedPairs):
     poses : str
         "published": `metadata/<split>.pkl` of GeoTransformer, as it is. "own": what `hybridreg datasets
         kitti-list` writes to `metadata/hybridreg-<split>.json`, composed `T_icp @ M`. "icp": Predator's
-        `icp/S_i_j.npy`, composed `M @ T_icp`. "odometry": `poses/NN.txt` without ICP. Empty: the first that is
-        there.
+        `icp/S_i_j.npy`, composed `M @ T_icp`. "odometry": `poses/NN.txt` without ICP. Empty: the first that
+        is there.
 
     Raises
     ------
@@ -88,7 +89,7 @@ def _published(base: Path, split: str) -> _Made:
 
 def _published_entry(row: records.Record, base: Path, label: str, shelf: places.Shelf) -> PairFiles:
     drive, source, target = (
-        int(records.need(row, names, label))
+        records.number(row, names, label)
         for names in (records.SEQUENCE, records.SOURCE_FRAME, records.TARGET_FRAME)
     )
     clouds = []

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from hybridreg import se3
 from hybridreg.data import places
 from hybridreg.data.kitti_drives import SPLITS, Drive, base_of
-from hybridreg.data.listed import read_scan
+from hybridreg.data.pair_files import read_scan
 from hybridreg.data.trajectories import rigid
 from hybridreg.data.walking import kitti_pairs
 from hybridreg.io import write_json

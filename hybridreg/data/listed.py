@@ -4,63 +4,19 @@
 from __future__ import annotations
 
 import inspect
-import zlib
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections import Counter
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
-from hybridreg.cloud import PointCloud
 from hybridreg.data import spelling
 from hybridreg.data.dataset import Dataset
+from hybridreg.data.pair_files import PairFiles, PairTable
 from hybridreg.data.places import refuse_missing
-from hybridreg.data.pth import read_pth
-from hybridreg.io import read_image, read_points
-from hybridreg.pair import LabelledPair, Pair
+from hybridreg.pair import LabelledPair
 
-Array = NDArray[np.float64]
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class PairFiles:
-    """Where one pair lies, and its true pose.
-
-    Attributes
-    ----------
-    id : str
-    source, target : Path
-    T_target_source : (4, 4) float64
-    image : Path or None
-    overlap : float or None
-        As the data set's own list tells it.
-    source_sensor, target_sensor : str
-    facts : mapping
-        For reports; becomes `pair.meta`.
-    """
-
-    id: str
-    source: Path
-    target: Path
-    T_target_source: Array
-    image: Path | None = None
-    overlap: float | None = None
-    source_sensor: str = ""
-    target_sensor: str = ""
-    facts: Mapping[str, Any] = field(default_factory=dict)
-
-    def read(self) -> LabelledPair:
-        """Read the pair's files."""
-        pair = Pair(
-            source=read_scan(self.source, f"{self.id} source", self.source_sensor),
-            target=read_scan(self.target, f"{self.id} target", self.target_sensor),
-            image=None if self.image is None else read_image(self.image),
-            id=self.id,
-            meta=dict(self.facts),
-        )
-        return LabelledPair(pair=pair, T_target_source=self.T_target_source, overlap=self.overlap)
+# What this process has seen to point the right way. Not kept in the set itself: a parallel run unpickles a
+# set afresh for every task, which would then read 20 pairs to hand out one.
+_CHECKED: set[tuple[str, int]] = set()
 
 
 class ListedPairs(Dataset):
@@ -96,13 +52,13 @@ class ListedPairs(Dataset):
         overlap_radius: float = 0.5,
         fields: tuple[str, ...] = (),
     ) -> None:
-        self.entries, self.origin, self.fields = tuple(entries), origin, fields
+        self.entries, self.origin, self.fields = PairTable(entries), origin, fields
         self.overlap_radius = overlap_radius
-        self.if_inverted, self._direction_open = if_inverted, bool(if_inverted)
+        self.if_inverted = if_inverted
         if not self.entries:
             raise ValueError(f"{origin}: no pairs come of it; are its clouds and poses those of one drive?")
-        self._ids = _unique([entry.id for entry in self.entries], origin)
-        refuse_missing(_files(self.entries), str(origin))
+        _refuse_doubles(self.entries.ids, origin)
+        refuse_missing((f for e in entries for f in e.files() if f is not None), str(origin))
 
     @classmethod
     def from_text(cls, text: str) -> ListedPairs:
@@ -113,16 +69,16 @@ class ListedPairs(Dataset):
 
     @property
     def ids(self) -> tuple[str, ...]:
-        return self._ids
+        return self.entries.ids
 
     def read(self, index: int) -> LabelledPair:
         """Read pair `index` as it is listed, without a look at the direction of its pose."""
         return self.entries[index].read()
 
     def load(self, index: int) -> LabelledPair:
-        if self._direction_open:
+        if self.if_inverted and (key := (str(self.origin), self.entries.digest())) not in _CHECKED:
             self.check()
-            self._direction_open = False
+            _CHECKED.add(key)
         return self.read(index)
 
     def check(self) -> None:
@@ -132,30 +88,10 @@ class ListedPairs(Dataset):
         direction.check(self, str(self.origin), self.if_inverted)
 
     def fingerprint(self) -> str:
-        digest = 0
-        for entry in self.entries:
-            files = f"{entry.id} {entry.source.name} {entry.target.name}".encode()
-            digest = zlib.crc32(files + np.round(entry.T_target_source, 9).tobytes(), digest)
-        return f"{digest:08x}"
+        return f"{self.entries.digest():08x}"
 
 
-def read_scan(path: Path, name: str, sensor: str = "") -> PointCloud:
-    """A cloud without its missing returns: not finite, or exactly at the sensor, as drivers write them."""
-    points = read_pth(path) if path.suffix == ".pth" else np.array(read_points(path))
-    points[~points.any(axis=1)] = np.nan
-    try:
-        return PointCloud.of(points, name=name, sensor=sensor, nonfinite="drop")
-    except ValueError as error:
-        raise ValueError(f"{path}: {error}") from error
-
-
-def _unique(ids: list[str], origin: Path) -> tuple[str, ...]:
-    if len(set(ids)) < len(ids):
-        seen: set[str] = set()
-        double = next(i for i in ids if i in seen or seen.add(i))  # type: ignore[func-returns-value]
-        raise ValueError(f"{origin}: lists the pair {double!r} {ids.count(double)} times; leave one of them")
-    return tuple(ids)
-
-
-def _files(entries: Sequence[PairFiles]) -> list[Path]:
-    return [file for e in entries for file in (e.source, e.target, e.image) if file is not None]
+def _refuse_doubles(ids: tuple[str, ...], origin: Path) -> None:
+    double, times = Counter(ids).most_common(1)[0]
+    if times > 1:
+        raise ValueError(f"{origin}: lists the pair {double!r} {times} times; leave one of them")

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from hybridreg.data.listed import PairFiles
+from hybridreg.data.pair_files import PairFiles
 from hybridreg.io import write_json
 
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from hybridreg import se3
 from hybridreg.data.pickles import read_pickle
 from hybridreg.data.trajectories import rigid
-from hybridreg.io.faults import fault
+from hybridreg.io.faults import fault, shorten
 
 Array = NDArray[np.float64]
 Record = Mapping[str, Any]
@@ -87,6 +87,44 @@ def need(record: Record, aliases: Sequence[str], label: str) -> Any:
     return value
 
 
+def number(record: Record, aliases: Sequence[str], label: str) -> int:
+    """The number of a sequence or frame: 8, "08", "seq_08", "08/000123.ply".
+
+    Raises
+    ------
+    ValueError
+        The field is not there, or holds none.
+    """
+    value = need(record, aliases, label)
+    if isinstance(value, (float, np.floating)):
+        digits = f"{value:.0f}" if float(value).is_integer() else ""
+    else:
+        digits = str(value).rpartition("/")[2].rpartition("_")[2].partition(".")[0]
+    if not (digits.isdecimal() and len(digits) <= 18):
+        raise fault(
+            label,
+            f"has {shorten(value)} where a sequence's or frame's number should be",
+            "write it in digits",
+        )
+    return int(digits)
+
+
+def overlap(record: Record, label: str) -> float | None:
+    """The overlap that the list tells, or None.
+
+    Raises
+    ------
+    ValueError
+        It is no share.
+    """
+    value = find(record, ("overlap",))
+    if value is None:
+        return None
+    if not isinstance(value, (int, float, np.number)) or not 0.0 <= float(value) <= 1.0:
+        raise fault(label, f"has the overlap {shorten(value)}", "it is a share between 0 and 1")
+    return float(value)
+
+
 def transform_of(record: Record, label: str) -> Array:
     """The pose (4, 4) of a record, from one matrix or from rotation and translation.
 
@@ -97,9 +135,16 @@ def transform_of(record: Record, label: str) -> Array:
     """
     whole = find(record, TRANSFORM)
     if whole is not None:
-        return rigid(whole, f"{label}: transform")
-    R = np.asarray(need(record, TRANSFORM + ROTATION, label), dtype=np.float64)
-    t = np.asarray(need(record, TRANSLATION, label), dtype=np.float64).reshape(-1)
+        return rigid(_numbers(whole, label), f"{label}: transform")
+    R = _numbers(need(record, TRANSFORM + ROTATION, label), label)
+    t = _numbers(need(record, TRANSLATION, label), label).reshape(-1)
     if R.shape != (3, 3) or t.shape != (3,):
         raise fault(label, f"its rotation has the shape {R.shape}, its translation {t.shape}")
     return rigid(se3.from_rt(R, t), f"{label}: rotation")
+
+
+def _numbers(value: Any, label: str) -> Array:
+    try:
+        return np.asarray(value, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise fault(label, f"has {shorten(value)} where a pose's numbers should be") from error

@@ -9,7 +9,8 @@ from pathlib import Path
 
 from hybridreg import se3
 from hybridreg.data import places
-from hybridreg.data.listed import ListedPairs, PairFiles
+from hybridreg.data.listed import ListedPairs
+from hybridreg.data.pair_files import PairFiles
 from hybridreg.data.trajectories import read_matrix
 
 # Pattern of the pairs' folders to the sensor that Kinect's cloud is registered to.

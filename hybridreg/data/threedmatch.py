@@ -7,7 +7,8 @@ import os
 from pathlib import Path, PurePosixPath
 
 from hybridreg.data import places, records
-from hybridreg.data.listed import ListedPairs, PairFiles
+from hybridreg.data.listed import ListedPairs
+from hybridreg.data.pair_files import PairFiles
 
 
 class ThreeDMatch(ListedPairs):
@@ -43,13 +44,12 @@ def _entry(row: records.Record, base: Path, label: str, shelf: places.Shelf) -> 
     source, target = (
         PurePosixPath(str(records.need(row, names, label))) for names in (records.SOURCE, records.TARGET)
     )
-    overlap = records.find(row, ("overlap",))
     return PairFiles(
         id=f"{source.parent.name}/{_number(source)}-{_number(target)}",
         source=_place(base, source, shelf),
         target=_place(base, target, shelf),
         T_target_source=records.transform_of(row, label),
-        overlap=None if overlap is None else float(overlap),
+        overlap=records.overlap(row, label),
     )
 
 

@@ -6,6 +6,7 @@ from __future__ import annotations
 import dataclasses
 import json
 import os
+import pickle
 from pathlib import Path
 
 import loader_trees
@@ -17,7 +18,8 @@ from hypothesis import strategies as st
 from hybridreg import se3
 from hybridreg.data import azimuth, direction, overlapping
 from hybridreg.data.folder import PairFolder
-from hybridreg.data.listed import ListedPairs, PairFiles
+from hybridreg.data.listed import ListedPairs
+from hybridreg.data.pair_files import PairFiles
 
 
 def ring(start: float, width: float, n: int = 4000, seed: int = 0) -> np.ndarray:
@@ -93,6 +95,8 @@ def test_the_check_is_made_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
     whole = direction.check
     monkeypatch.setattr(direction, "check", lambda *a: (calls.append(1), whole(*a)))
     pairs[0], pairs[1]
+    # A task of a parallel run unpickles the set anew.
+    pickle.loads(pickle.dumps(pairs))[0]
     assert len(calls) == 1
 
 

@@ -3,8 +3,10 @@
 
 from __future__ import annotations
 
+import dataclasses
 import pickle
 import shutil
+import time
 from pathlib import Path
 
 import loader_trees
@@ -12,7 +14,7 @@ import numpy as np
 import pytest
 from loader_trees import Tree
 
-from hybridreg.data import listed, open_dataset, pth
+from hybridreg.data import ListedPairs, PairFiles, open_dataset, pair_files, pth
 from hybridreg.data.direction import overlap
 from hybridreg.pair import LabelledPair
 
@@ -50,8 +52,8 @@ def test_layout_is_recognised_without_a_name(written: Tree) -> None:
 
 def test_no_cloud_is_read_before_it_is_asked_for(written: Tree, monkeypatch: pytest.MonkeyPatch) -> None:
     open_dataset(written.spelled)  # whatever is measured once and kept
-    monkeypatch.setattr(listed, "read_points", _refuse)
-    monkeypatch.setattr(listed, "read_pth", _refuse)
+    monkeypatch.setattr(pair_files, "read_points", _refuse)
+    monkeypatch.setattr(pair_files, "read_pth", _refuse)
     pairs = open_dataset(written.spelled)
     assert len(pairs) == len(pairs.ids) > 0
     assert pairs.fingerprint()
@@ -110,18 +112,43 @@ def test_truncated_cloud_fails_alone(copied: Tree) -> None:
 
 def test_fingerprint_follows_the_poses(written: Tree) -> None:
     pairs = open_dataset(written.spelled)
-    before = pairs.fingerprint()
     moved = pairs.entries[0].T_target_source.copy()
     moved[0, 3] += 0.01
-    object.__setattr__(pairs.entries[0], "T_target_source", moved)
-    assert pairs.fingerprint() != before
+    others = [dataclasses.replace(pairs.entries[0], T_target_source=moved), *pairs.entries[1:]]
+    assert ListedPairs(pairs.entries, written.root).fingerprint() == pairs.fingerprint()
+    assert ListedPairs(others, written.root).fingerprint() != pairs.fingerprint()
+
+
+def test_a_large_set_travels_lightly(monkeypatch: pytest.MonkeyPatch) -> None:
+    # Parallel runs pickle the set with every task; this is as many pairs as Cross3DReg has.
+    monkeypatch.setattr("hybridreg.data.listed.refuse_missing", lambda *_: None)
+    there = Path("/data/sequences/08")
+    many = [
+        PairFiles(
+            id=f"08/{n}",
+            source=there / f"array/{n:06d}.ply",
+            target=there / f"lidar/{n:06d}.ply",
+            image=there / f"image/{n:06d}.jpg",
+            T_target_source=np.eye(4),
+        )
+        for n in range(13_231)
+    ]
+    pairs = ListedPairs(many, there)
+    started = time.process_time()
+    again = pickle.loads(pickle.dumps(pairs))
+    light = time.process_time() - started
+    started = time.process_time()
+    pickle.loads(pickle.dumps(many))
+    assert light < 0.3 * (time.process_time() - started)
+    assert again.ids == pairs.ids
+    assert again.entries[-1].image == many[-1].image
 
 
 def test_missing_returns_are_left_out(tmp_path: Path) -> None:
     points = np.vstack([np.random.default_rng(0).normal(size=(60, 3)) * 5, np.zeros((30, 3))])
     points[0, 1] = np.nan
     np.save(tmp_path / "scan.npy", points)
-    cloud = listed.read_scan(tmp_path / "scan.npy", "scan")
+    cloud = pair_files.read_scan(tmp_path / "scan.npy", "scan")
     assert len(cloud) == 59
     assert cloud.dropped == 31
 
@@ -131,5 +158,5 @@ def test_pth_is_read_as_a_scan(tmp_path: Path) -> None:
 
     points = np.random.default_rng(0).normal(size=(60, 3))
     torch.save(points, tmp_path / "a.pth")
-    assert np.array_equal(listed.read_scan(tmp_path / "a.pth", "a").points, points)
+    assert np.array_equal(pair_files.read_scan(tmp_path / "a.pth", "a").points, points)
     assert np.array_equal(pth.read_pth(tmp_path / "a.pth"), points)

@@ -5,16 +5,17 @@ from __future__ import annotations
 
 import inspect
 import pickle
+import tempfile
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hybridreg import se3
-from hybridreg.data import records, spelling, trajectories
+from hybridreg.data import Cross3DReg, Kitti, ThreeDMatch, records, spelling, trajectories
 
 
 def some_pose(seed: int = 0) -> np.ndarray:
@@ -49,6 +50,7 @@ def test_rows_and_columns_are_the_same_list(tmp_path: Path) -> None:
         ("text", "no list of dictionaries"),
         ([1, 2], "no list of dictionaries"),
         (None, "no list of dictionaries"),
+        ({"src": 3}, "unequal length"),
     ],
 )
 def test_lists_that_are_none(content: Any, told: str, tmp_path: Path) -> None:
@@ -92,6 +94,49 @@ def test_rounded_poses_become_rotations_again(seed: int, digits: int) -> None:
     exact = trajectories.rigid(np.round(T, digits), "pose")
     assert np.allclose(exact[:3, :3] @ exact[:3, :3].T, np.eye(3), atol=1e-12)
     assert np.allclose(exact, T, atol=2 * 10.0**-digits)
+
+
+@pytest.mark.parametrize(
+    ("value", "number"),
+    [(8, 8), ("08", 8), (np.int64(3), 3), (8.0, 8), ("seq_10", 10), ("08/000123.ply", 123)],
+)
+def test_numbers_however_written(value: Any, number: int) -> None:
+    assert records.number({"seq": value}, records.SEQUENCE, "pair") == number
+
+
+@pytest.mark.parametrize("value", ["", "a", None, [8], {}, -1, 8.5, 1.5e300, float("nan"), float("inf"), "9" * 40])
+def test_numbers_that_are_none(value: Any) -> None:
+    with pytest.raises(ValueError, match="pair"):
+        records.number({"seq": value}, records.SEQUENCE, "pair")
+
+
+@pytest.mark.parametrize("value", ["half", [0.5], -0.1, 1.5, float("nan")])
+def test_overlaps_that_are_none(value: Any) -> None:
+    with pytest.raises(ValueError, match="it is a share between 0 and 1"):
+        records.overlap({"overlap": value}, "pair")
+
+
+JUNK = st.recursive(
+    st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=9) | st.binary(max_size=9),
+    lambda inner: st.lists(inner, max_size=4) | st.dictionaries(st.text(max_size=4), inner, max_size=3),
+    max_leaves=8,
+)
+NAMES = ["seq_id", "frame0", "frame1", "pcd0", "pcd1", "transform", "rot", "trans", "overlap", "image"]
+
+
+@pytest.mark.parametrize("loader", [Cross3DReg, Kitti, ThreeDMatch])
+@given(row=st.dictionaries(st.sampled_from(NAMES), JUNK), data=st.data())
+@settings(max_examples=60)
+def test_rows_of_junk_are_told_as_such(loader: Any, row: dict[str, Any], data: st.DataObject) -> None:
+    sound = {"seq_id": 8, "frame0": 0, "frame1": 9, "pcd0": "a.ply", "pcd1": "b.ply", "transform": np.eye(4)}
+    kept = {name: value for name, value in sound.items() if data.draw(st.booleans(), label=name)}
+    with tempfile.TemporaryDirectory() as folder:
+        (Path(folder) / "metadata").mkdir()
+        for split in ("test", "3DMatch"):
+            written(Path(folder) / "metadata" / f"{split}.pkl", [{**row, **kept}])
+        with pytest.raises((ValueError, FileNotFoundError)) as caught:
+            loader(folder)
+        assert folder in str(caught.value)
 
 
 def test_poses_of_a_file(tmp_path: Path) -> None:
