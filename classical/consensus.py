@@ -28,7 +28,7 @@ class Support(NamedTuple):
 
     T: Array  # (4, 4)
     inliers: Mask  # (K,)
-    count: int
+    n_inliers: int
     score: float  # the count, a match weighing less the larger its residual (MSAC, Torr and Zisserman 2000)
 
 
