@@ -18,13 +18,16 @@ _SAME, _ANOTHER_SCALE = 0.01, 2.0
 
 def encode(scene: Scene, stage: NetworkStage) -> Encoding:
     """The pair after the encoders of a stage's network."""
+    if stage.random_parts():
+        scene.note(f"{type(stage).__name__} ran with random weights (untrained=True)")
     return scene.shared(("encoding", stage.network_name()), lambda: _encode(scene, stage))
 
 
 def _encode(scene: Scene, stage: NetworkStage) -> Encoding:
     network = stage.network()
-    if network.image_encoder is not None and scene.pair.image is None:
-        scene.note("no image: the network works from the clouds alone, a learned token in the image's place")
+    if network.image_encoder is not None and not (stage.sees() and scene.pair.image is not None):
+        why = "no image" if scene.pair.image is None else "the network was trained without images"
+        scene.note(f"{why}: it works from the clouds alone, a learned token in the image's place")
     with torch.inference_mode():
         return network.encode(_batch(scene, stage))
 
@@ -42,7 +45,7 @@ def _batch(scene: Scene, stage: NetworkStage) -> Batch:
         target.points,
         source.points,
         config,
-        image=scene.pair.image,
+        image=scene.pair.image if stage.sees() else None,
         subsample=not ready,
         device=stage.device,
     )

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from typing_extensions import Self
 
     from hybridreg.learned.network import RegistrationNetwork
-    from hybridreg.learned.stages.networks import NetworkName
+    from hybridreg.learned.stages.networks import Loaded, NetworkName
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -81,17 +81,30 @@ class NetworkStage(Stage):
         ValueError
             As `from_pretrained`.
         """
-        from hybridreg.learned.stages import networks
-
-        loaded = networks.load(self.network_name())
+        loaded = self._load()
         self.check(loaded.network)
-        random = sorted(self.parts & loaded.untrained)
+        random = self.random_parts()
         if random and not self.untrained:
             raise ValueError(
                 f"{type(self).__name__}: these weights are random: {', '.join(random)} of {self.weights!r} was never "
                 "trained; name other weights, or insist with untrained=True"
             )
         return loaded.network
+
+    def random_parts(self) -> list[str]:
+        """Those of this stage's parts that were never trained."""
+        return sorted(self.parts & self._load().untrained)
+
+    def sees(self) -> bool:
+        """Has the network learned to look at images? Insisted-on random weights count as if they had."""
+        loaded = self._load()
+        blind = "image_encoder" in loaded.untrained and not self.random_parts()
+        return loaded.network.image_encoder is not None and not blind
+
+    def _load(self) -> Loaded:
+        from hybridreg.learned.stages.networks import load
+
+        return load(self.network_name())
 
     def network_name(self) -> NetworkName:
         """What tells this stage's network from others; stages of one name share one encoding of a pair."""

@@ -30,5 +30,4 @@ def gather(probability: Array, points: Array, nodes: Array) -> Array:
 
 
 def _nearest(queries: Array, of: Array) -> NDArray[np.int64]:
-    index: NDArray[np.int64] = cKDTree(of).query(queries)[1]
-    return index
+    return np.asarray(cKDTree(of).query(queries)[1], dtype=np.int64)
