@@ -76,8 +76,9 @@ class Lgr(Stage):
         with threadpool_limits(limits=1, user_api="blas"):
             found = self._estimate(scene, matches, rows, max_distance)
             T: Array = found.transform.numpy()
-            residual = np.linalg.norm(se3.apply(T, matches.source) - matches.target, axis=1)
-            inliers = residual < max_distance
+            residual = np.linalg.norm(se3.apply(T, matches.source[rows]) - matches.target[rows], axis=1)
+            inliers = np.zeros(len(matches), dtype=bool)
+            inliers[rows] = residual < max_distance
             _, status = kabsch(matches.source[inliers], matches.target[inliers], matches.weight[inliers])
             if status in ("few", "nan"):
                 return Pose.unknown(len(matches))

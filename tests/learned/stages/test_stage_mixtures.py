@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -11,6 +12,8 @@ import torch
 
 import hybridreg as hr
 from hybridreg import se3, testing
+from hybridreg._open3d import load_open3d
+from hybridreg.learned.sizes import named_config
 from hybridreg.matches import Correspondences, Overlap
 from hybridreg.scene import Scene
 
@@ -23,6 +26,13 @@ def pipeline(**stages: object) -> hr.Pipeline:
     return hr.Pipeline(**{"voxel": 0.5, "refine": "none", **stages})
 
 
+def _is_near(T: np.ndarray, truth: np.ndarray) -> bool:
+    # Fine points of a metre's grid, two candidates each: a neighbour's match is off by decimetres, a fit to all
+    # of them by centimetres.
+    error = se3.inverse(truth) @ T
+    return bool(se3.angle_deg(error[:3, :3]) < 0.5 and np.linalg.norm(error[:3, 3]) < 0.1)
+
+
 @pytest.mark.parametrize("estimate", ["ransac", "lgr"])
 @pytest.mark.parametrize("match", MATCHERS)
 @pytest.mark.parametrize("overlap", OVERLAPS)
@@ -30,7 +40,7 @@ def test_every_mixture_finds_a_shift(shifted: Shifted, overlap: str, match: str,
     pair, truth = shifted
     pipe = pipeline(overlap=OVERLAPS[overlap], match=MATCHERS[match], estimate=estimate)
     result = pipe.run(pair)
-    assert np.allclose(result.transformation, truth, atol=1e-4)
+    assert _is_near(result.transformation, truth)
     assert result.matches.group is not None
     assert result.verdict == "ok"
 
@@ -40,37 +50,48 @@ def test_svd_takes_the_matches_too(shifted: Shifted) -> None:
     right = np.linalg.norm(trace.matches.target - se3.apply(shifted[1], trace.matches.source), axis=1) < 0.01
     assert right.mean() > 0.3, "a pose from matches that are all wrong tests nothing"
     assert trace.estimated.found
-    assert not np.allclose(trace.estimated.T, shifted[1], atol=1e-4), "no defence against the wrong ones"
+    centre = np.median(shifted[0].source.points, axis=0)
+    gap = se3.apply(trace.estimated.T, centre[None]) - se3.apply(shifted[1], centre[None])
+    assert np.linalg.norm(gap) < 0.5, "the wrong ones lie all around"
 
 
 def test_a_learned_mask_feeds_fpfh() -> None:
-    pytest.importorskip("open3d")
-    pair, _ = testing.sample_pair()
-    omp, fpfh = hr.Omp(untrained=True), hr.Fpfh(min_overlap=0.6)
-    trace = pipeline(overlap=omp, match=fpfh, estimate="ransac").trace(pair)
-    assert len(trace.matches) > 20
-    index = trace.matches.source_index
-    assert index is not None
-    if any("matched all points" in note for note in trace.scene.notes):
-        assert (trace.overlap.source > 0.6).sum() < 100
-    else:
-        assert (trace.overlap.source[index] > 0.6).all()
+    try:
+        load_open3d()
+    except ImportError as error:
+        pytest.skip(str(error))
+    scene, _ = testing.sample_scene()
+    overlap = hr.Omp(untrained=True)(scene)
+    middle = float(np.median(np.concatenate([overlap.source, overlap.target])))
+    found = hr.Fpfh(min_overlap=middle)(scene, overlap)
+    assert len(found) > 20
+    assert found.source_index is not None
+    assert found.target_index is not None
+    assert (overlap.source[found.source_index] > middle).all()
+    assert (overlap.target[found.target_index] > middle).all()
+    pipe = pipeline(overlap=hr.Omp(untrained=True), match=hr.Fpfh(), estimate="ransac")
+    assert pipe.run(scene.pair).verdict == "ok"
 
 
-def test_a_given_mask_rules_the_matches(shifted: Shifted) -> None:
+@pytest.mark.parametrize("match", MATCHERS)
+def test_a_given_mask_rules_the_matches(
+    shifted: Shifted, make_weights: Callable[..., str], match: str
+) -> None:
     class Half:
         def __call__(self, scene: Scene) -> Overlap:
-            return Overlap(
-                np.where(scene.source.points[:, 0] > 0.0, 0.9, 0.1),
-                np.ones(len(scene.target)),
-            )
+            inside = scene.source.points[:, 0] > 4.0
+            return Overlap(np.where(inside, 0.9, 0.1), np.ones(len(scene.target)))
 
-    for match in MATCHERS.values():
-        found = pipeline(overlap=Half(), match=match, estimate="lgr").trace(shifted[0]).matches
-        everywhere = pipeline(match=match, estimate="lgr").trace(shifted[0]).matches
-        # Superpoints of 4 m: a patch may reach so far over the border.
-        assert found.source[:, 0].min() > -4.0
-        assert everywhere.source[:, 0].min() < -5.0
+    config = named_config("nano", omp=True, vgam=match == "vgam")
+    assert config.omp is not None
+    # The ladder would fill a mask of so few superpoints up again.
+    config = dataclasses.replace(config, omp=dataclasses.replace(config.omp, min_kept=4))
+    stage = type(MATCHERS[match])(weights=make_weights(config))
+    found = pipeline(overlap=Half(), match=stage, estimate="lgr").trace(shifted[0]).matches
+    everywhere = pipeline(match=stage, estimate="lgr").trace(shifted[0]).matches
+    # Superpoints are 4 m apart: their patches may reach over the border by a diagonal.
+    assert found.source[:, 0].min() > 4.0 - 4.0 * np.sqrt(2.0)
+    assert everywhere.source[:, 0].min() < -4.0
 
 
 def test_lgr_takes_matches_of_the_user(shifted: Shifted) -> None:
@@ -119,7 +140,8 @@ def test_map_coordinates_reach_the_network_as_small_ones(shifted: Shifted) -> No
     moved = hr.Pair.of(pair.source.points + far, pair.target.points + far, pair.image)
     pipe = pipeline(match=MATCHERS["geotransformer"], estimate="lgr")
     T = pipe.run(moved).transformation
-    assert np.allclose(T[:3, :3] @ far + T[:3, 3] - far, truth[:3, 3], atol=1e-2)
+    back, there = se3.from_rt(np.eye(3), -far), se3.from_rt(np.eye(3), far)
+    assert _is_near(back @ T @ there, truth)
 
 
 def test_estimators_heed_the_spacing_of_the_matches() -> None:
