@@ -96,9 +96,9 @@ class NetworkStage(Stage):
         return sorted(self.parts & self._load().untrained)
 
     def sees(self) -> bool:
-        """Has the network learned to look at images? Insisted-on random weights count as if they had."""
+        """Has the network learned to look at images? One that is random altogether counts as if it had."""
         loaded = self._load()
-        blind = "image_encoder" in loaded.untrained and not self.random_parts()
+        blind = "image_encoder" in loaded.untrained and "backbone" not in loaded.untrained
         return loaded.network.image_encoder is not None and not blind
 
     def _load(self) -> Loaded:
