@@ -27,7 +27,7 @@ def _encode(scene: Scene, stage: NetworkStage) -> Encoding:
     network = stage.network()
     if network.image_encoder is not None and not (stage.sees() and scene.pair.image is not None):
         why = "no image" if scene.pair.image is None else "the network was trained without images"
-        scene.note(f"{why}: it works from the clouds alone, a learned token in the image's place")
+        scene.note(f"{why}: features come from the clouds alone, a learned token in the image's place")
     with torch.inference_mode():
         return network.encode(_batch(scene, stage))
 
@@ -53,8 +53,8 @@ def _batch(scene: Scene, stage: NetworkStage) -> Batch:
 
 def _mismatch(spacing: float, voxel: float) -> str:
     text = (
-        f"the network was trained with a voxel of {voxel:.3g} m and made its own grid of it; the other stages work "
-        f"at {spacing:.3g} m"
+        f"the network was trained with a voxel of {voxel:.3g} m and put the clouds on a grid of its own; the other "
+        f"stages work at {spacing:.3g} m"
     )
     if max(spacing / voxel, voxel / spacing) > _ANOTHER_SCALE:
         return f"{text}: is the scene of the size that the network was trained for?"
