@@ -27,7 +27,7 @@ Matches = NDArray[np.int64]
 
 def ours(a: Array, b: Array) -> Matches:
     found = nearest(a, b)
-    return np.column_stack([np.flatnonzero(found.mutual), found.index[found.mutual]])
+    return np.column_stack([np.flatnonzero(found.mutual), found.row[found.mutual]])
 
 
 def scipy_tree(a: Array, b: Array) -> Matches:

@@ -29,7 +29,7 @@ class Support:
 
     T: Array  # (4, 4)
     inliers: Mask  # (K,)
-    count: int
+    n_inliers: int
     score: float  # the count, a match weighing less the larger its residual (MSAC, Torr and Zisserman 2000)
 
 

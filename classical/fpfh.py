@@ -88,7 +88,7 @@ class Fpfh(Stage):
         keep = found.mutual if self.mutual else np.ones(len(rows[0]), dtype=bool)
         if self.ratio is not None:
             keep = keep & (found.distance < self.ratio * found.second)
-        source_index, target_index = rows[0][keep], rows[1][found.index[keep]]
+        source_index, target_index = rows[0][keep], rows[1][found.row[keep]]
         return Correspondences(
             source=scene.source.points[source_index],
             target=scene.target.points[target_index],

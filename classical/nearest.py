@@ -20,12 +20,12 @@ _ROWS = 128
 class Nearest:
     """For each source descriptor, its nearest target descriptor.
 
-    index : (n,) int64, row of the target
+    row : (n,) int64, of the nearest target
     distance, second : (n,) float64, to the nearest and to the next one; infinite where there is no next
     mutual : (n,) bool, the nearest target has no nearer source descriptor; true once for each target at most
     """
 
-    index: Indices
+    row: Indices
     distance: Array
     second: Array
     mutual: NDArray[np.bool_]

@@ -41,7 +41,7 @@ def modes(
         near[0] = True
         left = left[~near]
         # Refitting about doubles a hypothesis's support at most, so half the share is asked for before it.
-        least = max(least, 0.5 * share * found[-1].count)
+        least = max(least, 0.5 * share * found[-1].n_inliers)
     found.sort(key=lambda one: -one.score)
     return _distinct([one for one in found if one.score >= share * found[0].score], centre, consensus)
 
