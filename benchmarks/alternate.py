@@ -5,25 +5,34 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
-
-import numpy as np
 
 from hybridreg.data import open_dataset
 from hybridreg.pair import LabelledPair
 
 
-def seconds(rivals: dict[str, Callable[[], Any]], rounds: int = 5) -> dict[str, float]:
-    """Median wall time of each rival over `rounds` turns, after one turn that warms up caches and imports."""
-    times: dict[str, list[float]] = {name: [] for name in rivals}
-    for turn in range(rounds + 1):
+@dataclass
+class Timed:
+    """Best wall time of a rival in seconds, and what it returned."""
+
+    seconds: float
+    result: Any
+
+
+def race(rivals: dict[str, Callable[[], Any]], rounds: int = 5) -> dict[str, Timed]:
+    """Let every rival run `rounds` times, one after the other, after a turn that warms up caches and imports.
+
+    The best time of each counts: on a machine that others use, it says most about the work itself.
+    """
+    timed = {name: Timed(float("inf"), run()) for name, run in rivals.items()}
+    for _ in range(rounds):
         for name, run in rivals.items():
             start = time.perf_counter()
             run()
-            if turn:
-                times[name].append(time.perf_counter() - start)
-    return {name: float(np.median(taken)) for name, taken in times.items()}
+            timed[name].seconds = min(timed[name].seconds, time.perf_counter() - start)
+    return timed
 
 
 def real_pairs(folder: str, wanted: list[str]) -> list[LabelledPair]:

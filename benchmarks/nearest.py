@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Mutual nearest neighbours among FPFH descriptors: our blocks of a matrix product beside four libraries.
 
-A ratio below 1 means that ours is faster. "agree" is the share of a peer's mutual matches that ours finds too; equal
-descriptors, and float32, make it less than 1.
+A ratio below 1 means that ours is faster. "agree" is the share of a peer's mutual matches that ours has too;
+equal descriptors, and float32, make it less than 1.
 
     python -m benchmarks.nearest --data ../shared/data/real --pairs kitti-odo-5-to-0
 """
@@ -11,12 +11,13 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 import hybridreg as hr
-from benchmarks.alternate import real_pairs, seconds
+from benchmarks.alternate import race, real_pairs
 from hybridreg._open3d import load_open3d
 from hybridreg.classical.nearest import nearest
 
@@ -26,7 +27,7 @@ Matches = NDArray[np.int64]
 
 def ours(a: Array, b: Array) -> Matches:
     found = nearest(a, b)
-    return np.column_stack([np.flatnonzero(found.mutual), found.index[found.mutual]])
+    return np.column_stack([np.flatnonzero(found.mutual), found.row[found.mutual]])
 
 
 def scipy_tree(a: Array, b: Array) -> Matches:
@@ -83,14 +84,13 @@ def main() -> None:
         scene = hr.VoxelGrid()(labelled.pair)
         a, b = (hr.Fpfh().features(scene, side) for side in ("source", "target"))
         a, b = a[a.any(axis=1)], b[b.any(axis=1)]
-        runs = {
-            name: (lambda method=method: method(a, b)) for name, method in {"ours": ours, **PEERS}.items()
-        }
-        taken = seconds(runs, options.rounds)
-        found = {tuple(row) for row in ours(a, b)}
+        runs = {name: partial(method, a, b) for name, method in {"ours": ours, **PEERS}.items()}
+        timed = race(runs, options.rounds)
+        taken = {name: run.seconds for name, run in timed.items()}
+        found = {tuple(row) for row in timed["ours"].result}
         print(f"{labelled.pair.id}: {len(a)} x {len(b)}, ours {1e3 * taken['ours']:.0f} ms")
-        for name, method in PEERS.items():
-            theirs = {tuple(row) for row in method(a, b)}
+        for name in PEERS:
+            theirs = {tuple(row) for row in timed[name].result}
             print(
                 f"  {name:18s} {1e3 * taken[name]:6.0f} ms, ours / theirs {taken['ours'] / taken[name]:.2f}, "
                 f"agree {len(found & theirs) / len(theirs):.3f}",

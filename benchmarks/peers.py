@@ -56,7 +56,9 @@ def open3d_then_gicp(voxel: float) -> Method:
         reg = o3d.pipelines.registration
         clouds, features = [], []
         for cloud in (labelled.pair.source, labelled.pair.target):
-            down = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(cloud.points)).voxel_down_sample(voxel)
+            down = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(cloud.points.copy())).voxel_down_sample(
+                voxel
+            )
             down.estimate_normals(o3d.geometry.KDTreeSearchParamHybrid(2 * voxel, 30))
             clouds.append(down)
             features.append(

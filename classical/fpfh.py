@@ -60,7 +60,7 @@ class Fpfh(Stage):
     mutual: bool = True
     ratio: float | None = None
     min_overlap: float = 0.5
-    max_points: int = 20_000
+    max_points: int = 50_000
 
     gives: ClassVar[frozenset[str]] = frozenset({"matches"})
 
@@ -88,7 +88,7 @@ class Fpfh(Stage):
         keep = found.mutual if self.mutual else np.ones(len(rows[0]), dtype=bool)
         if self.ratio is not None:
             keep = keep & (found.distance < self.ratio * found.second)
-        source_index, target_index = rows[0][keep], rows[1][found.index[keep]]
+        source_index, target_index = rows[0][keep], rows[1][found.row[keep]]
         return Correspondences(
             source=scene.source.points[source_index],
             target=scene.target.points[target_index],
@@ -122,8 +122,9 @@ class Fpfh(Stage):
 
 def _fpfh(points: Array, normals: Array, radius: float, max_neighbours: int) -> Array:
     o3d = load_open3d()
-    cloud = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(points))
-    cloud.normals = o3d.utility.Vector3dVector(normals)
+    # Copies, because Open3D refuses arrays that are read-only, as a cloud's are.
+    cloud = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(points.copy()))
+    cloud.normals = o3d.utility.Vector3dVector(normals.copy())
     search = o3d.geometry.KDTreeSearchParamHybrid(radius, max_neighbours)
     histograms = np.asarray(o3d.pipelines.registration.compute_fpfh_feature(cloud, search).data).T
     return np.sqrt(np.maximum(np.nan_to_num(histograms), 0.0))

@@ -38,23 +38,24 @@ def find(scene: Scene, side: Literal["source", "target"]) -> Ground | None:
 
 def _find(scene: Scene, side: Literal["source", "target"]) -> Ground | None:
     level: Level = getattr(scene, side)
-    if level.viewpoint is None:
+    viewpoint = level.viewpoint
+    if viewpoint is None:
         return None
     normals, planarity = surface(scene, side)
     _, axes = np.linalg.eigh((normals * planarity[:, None]).T @ normals)
     # Walls may outnumber the ground: the commonest direction is tried first, then the others.
     for axis in axes.T[::-1]:
         for up in (axis, -axis):
-            ground = _under(level, normals, up)
+            ground = _under(level, viewpoint, normals, up)
             if ground is not None:
                 return ground
     return None
 
 
-def _under(level: Level, normals: Array, up: Array) -> Ground | None:
+def _under(level: Level, viewpoint: Array, normals: Array, up: Array) -> Ground | None:
     along = level.points @ up
     floor = along[np.abs(normals @ up) > _FACES_UP]
-    floor = floor[floor < level.viewpoint @ up]
+    floor = floor[floor < viewpoint @ up]
     if len(floor) < _LEAST * len(along):
         return None
     # The fullest layer as thick as the ground.

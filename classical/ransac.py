@@ -150,7 +150,7 @@ class Ransac(Stage):
 
     def _optimised(self, consensus: Consensus, T: Array) -> int:
         support = consensus.support(T)
-        return consensus.refit(support).count if self.local_optimisation else support.count
+        return consensus.refit(support).n_inliers if self.local_optimisation else support.n_inliers
 
     def _wanted(self, inlier_ratio: float, size: int) -> float:
         # Samples after which one without outliers was drawn with the wanted confidence.

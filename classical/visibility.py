@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybridreg.classical import ground
-from hybridreg.classical.ground import Ground
 from hybridreg.matches import Overlap
 from hybridreg.range_image import RangeImage
 from hybridreg.resolution import reach
@@ -38,7 +37,7 @@ class Visibility(Stage):
 
     What it cannot tell, and does not pretend to: which way the other sensor faced (a narrow fan thins no
     direction of a full circle; the probability is that of a point which the fan is turned to), and what stood in
-    the way. A cloud without a viewpoint (put together from several places, or far from its origin) says nothing
+    the way. A cloud without a viewpoint (its origin lies outside the cloud) says nothing
     about what its sensor could see, and the other cloud's points all count.
 
     Parameters
@@ -70,8 +69,9 @@ def _reached(scene: Scene, side: Side, baseline: float) -> Array:
     farthest = float(np.quantile(image.ranges, 1.0 - _STRAYS))
     here, there = ground.find(scene, side), ground.find(scene, other)
     if here is None or there is None:
-        return _within_range(level, farthest, baseline)
-    return _within_view(level, here, image, there, farthest, baseline)
+        return _within_range(level.points - level.viewpoint, farthest, baseline)
+    up = here.above(level.points) - float(there.above(image.viewpoint[None])[0])
+    return _within_view(level.points - level.viewpoint, up, here.up, image, there.up, farthest, baseline)
 
 
 def _image(scene: Scene, side: Side) -> RangeImage | None:
@@ -79,30 +79,28 @@ def _image(scene: Scene, side: Side) -> RangeImage | None:
     viewpoint = cloud.viewpoint
     if viewpoint is None:
         return None
-    image = scene.shared(("range image", side), lambda: RangeImage.of(cloud.points, viewpoint))
-    return image if image.from_one_place else None
+    return scene.shared(("range image", side), lambda: RangeImage.of(cloud.points, viewpoint))
 
 
-def _within_range(level: Level, farthest: float, baseline: float) -> Array:
+def _within_range(ray: Array, farthest: float, baseline: float) -> Array:
     # Without a vertical the disc may lie in any plane; the share is that of a place somewhere on the line through
     # the point, which depends on the distance alone.
-    distance = np.linalg.norm(level.points - level.viewpoint, axis=1)
+    distance = np.linalg.norm(ray, axis=1)
     return np.clip((farthest + baseline - distance) / max(2.0 * baseline, 1e-9), 0.0, 1.0)
 
 
 def _within_view(
-    level: Level, here: Ground, image: RangeImage, there: Ground, farthest: float, baseline: float
+    ray: Array, rise: Array, up: Array, image: RangeImage, up_other: Array, farthest: float, baseline: float
 ) -> Array:
-    low, high = np.quantile(image.directions @ there.up, [_STRAYS, 1.0 - _STRAYS])
-    low, high = np.sin(np.arcsin(np.clip([low, high], -1.0, 1.0)) + image.resolution * np.array([-1.0, 1.0]))
-    eye = float(there.above(image.viewpoint[None])[0])
-    up = here.above(level.points) - eye
-    flat = level.points - level.viewpoint
-    flat = flat - np.outer(flat @ here.up, here.up)
-    seen = np.zeros(len(level))
-    for place in _places(here.up, baseline):
-        distance = np.sqrt(np.sum((flat - place) ** 2, axis=1) + up**2)
-        sine = up / np.maximum(distance, 1e-9)
+    # `rise`: heights over the other sensor's eye, if both stand on one ground.
+    low, high = np.quantile(image.directions @ up_other, [_STRAYS, 1.0 - _STRAYS])
+    edges = np.arcsin(np.clip([low, high], -1.0, 1.0)) + image.resolution * np.array([-1.0, 1.0])
+    low, high = np.sin(np.clip(edges, -0.5 * np.pi, 0.5 * np.pi))
+    flat = ray - np.outer(ray @ up, up)
+    seen = np.zeros(len(ray))
+    for place in _places(up, baseline):
+        distance = np.sqrt(np.sum((flat - place) ** 2, axis=1) + rise**2)
+        sine = rise / np.maximum(distance, 1e-9)
         seen += (distance <= farthest) & (sine >= low) & (sine <= high)
     return seen / _N_PLACES
 

@@ -24,14 +24,11 @@ _FINEST, _COARSEST = np.radians(0.5), np.radians(4.0)
 # Cells are as wide as the gaps between returns when doubling them covers less than this much more of the sky. It
 # would be 1 for a sharp-edged field of view with even rings; uneven rings and ragged edges add to it.
 _FILLED = 1.5
-# Of the returns of one sensor in one place at least this share is smooth (0.73 in the roughest real cloud, woods);
-# three scans of a street laid together came to 0.56.
-_LEAST_SMOOTH = 0.65
 _BITS = 12  # of a cell's index along one axis
 # Steeper than this a surface is seen edge-on, and how far a ray beside the point looks says nothing, degrees.
 _EDGE_ON_DEG = 75.0
-# Neighbouring directions whose ranges agree within this share lie on one surface.
-_SMOOTH = 0.1
+# Two returns of one cell whose ranges differ by less than this share lie on one surface.
+_ONE_SURFACE = 0.1
 
 
 class Seen(IntEnum):
@@ -54,16 +51,12 @@ class RangeImage:
     ranges : (n,) float64, metres
     resolution : float
         Angle between neighbouring rays across the widest regular gap (between rings), radians.
-    smoothness : float in [0, 1]
-        Share of returns whose neighbour in direction is at about the same range. From the sensor's true place
-        nearly all are; from another place, or for a cloud put together of several scans, near and far mix.
     """
 
     viewpoint: Array
     directions: Array
     ranges: Array
     resolution: float
-    smoothness: float
     tree: cKDTree
 
     @classmethod
@@ -86,13 +79,7 @@ class RangeImage:
         kept = _thin(directions, reach, max(0.5 * resolution, _FINEST))
         directions, reach = directions[kept], reach[kept]
         tree = cKDTree(directions, balanced_tree=False, compact_nodes=False)
-        smoothness = _smoothness(tree, directions, reach)
-        return cls(np.asarray(viewpoint, dtype=np.float64), directions, reach, resolution, smoothness, tree)
-
-    @property
-    def from_one_place(self) -> bool:
-        """Whether the returns can be those of one sensor at the viewpoint: else "looked through" means nothing."""
-        return self.smoothness >= _LEAST_SMOOTH
+        return cls(np.asarray(viewpoint, dtype=np.float64), directions, reach, resolution, tree)
 
     def look(
         self, points: Array, normals: Array | None = None, *, margin: float, reach: float = np.inf, k: int = 4
@@ -169,14 +156,7 @@ def _thin(directions: Array, ranges: Array, angle: float) -> Integers:
     near = order[np.concatenate([[0], change + 1])]
     far = order[np.concatenate([change, [len(order) - 1]])]
     # The farthest return too where it lies on another surface: a cell on an edge must tell of both.
-    return np.concatenate([near, far[ranges[far] > (1.0 + _SMOOTH) * ranges[near]]])
-
-
-def _smoothness(tree: cKDTree, directions: Array, ranges: Array) -> float:
-    step = max(1, len(ranges) // 2_000)
-    _, index = tree.query(directions[::step], k=[2], workers=-1)
-    neighbour = ranges[np.minimum(index[:, 0], len(ranges) - 1)]
-    return float(np.mean(np.abs(np.log(neighbour / ranges[::step])) < _SMOOTH))
+    return np.concatenate([near, far[ranges[far] > (1.0 + _ONE_SURFACE) * ranges[near]]])
 
 
 def _slope(rays: Array, normals: Array | None) -> Array:
@@ -185,4 +165,4 @@ def _slope(rays: Array, normals: Array | None) -> Array:
         return np.ones(len(rays))
     cosine = np.abs(np.einsum("ni,ni->n", rays, normals))
     cosine = np.maximum(cosine, np.cos(np.radians(_EDGE_ON_DEG)))
-    return np.sqrt(1.0 - cosine**2) / cosine
+    return np.sqrt(np.maximum(1.0 - cosine**2, 0.0)) / cosine

@@ -222,7 +222,7 @@ def test_save_and_load(tmp_path: Path) -> None:
     [
         ("match = ", "not a TOML file"),
         ("matcher = 'fpfh'", "matcher is no slot"),
-        ("match = 3", "expected a stage's name"),
+        ("match = 3", "match: 3 is no stage"),
         ("[match]\nradius = 1.0", "expected a stage's name"),
         ("[match]\nstage = 'fpfh'\nradious = 1.0", "radious"),
     ],

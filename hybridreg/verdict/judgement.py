@@ -144,7 +144,8 @@ def _surfaces(way: OneWay, target: View) -> dict[str, float]:
 
 
 def _share(part: NDArray[np.bool_], whole: NDArray[np.bool_]) -> float:
-    return float(np.count_nonzero(part) / max(np.count_nonzero(whole), 1))
+    n = int(np.count_nonzero(whole))
+    return float(np.count_nonzero(part)) / n if n else 0.0
 
 
 def _agreeing(matches: Correspondences, T: Array, distance: float) -> float:

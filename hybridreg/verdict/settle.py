@@ -26,7 +26,7 @@ def settle(source: View, target: View, T: Array, spacing: float, every: int = 3)
         hit = np.isfinite(distance)
         if np.count_nonzero(hit) < _FEWEST:
             return T
-        points, match = moved[hit], match[hit]
+        points, match = moved[hit], np.asarray(match)[hit]
         normals = target.normals[match]
         gap = np.einsum("ni,ni->n", points - target.points[match], normals)
         # Cauchy weights: half of the neighbours of a wrong guess are no neighbours.

@@ -88,5 +88,4 @@ def _image(scene: Scene, side: Side) -> RangeImage | None:
     viewpoint = cloud.viewpoint
     if viewpoint is None:
         return None
-    image = scene.shared(("range image", side), lambda: RangeImage.of(cloud.points, viewpoint))
-    return image if image.from_one_place else None
+    return scene.shared(("range image", side), lambda: RangeImage.of(cloud.points, viewpoint))

@@ -56,7 +56,7 @@ def _about_axis(agreement: Agreement, k: int) -> str:
     direction = " ".join(f"{x:.2f}" for x in agreement.axes[k])
     looked, agreed = int(agreement.looked[k]), int(agreement.agreed[k])
     if looked < FEW:
-        return f"only {looked} points that both sensors could see face along ({direction}) of the target, {agreed} agree"
+        return f"only {looked} points in view of both sensors face along ({direction}) of the target, {agreed} agree"
     return f"of {looked} points that face along ({direction}) of the target and were looked at, only {agreed} agree"
 
 
@@ -64,8 +64,8 @@ def _unknown(images: tuple[str, ...]) -> Iterator[str]:
     for name in ("source", "target"):
         if name not in images:
             yield (
-                f"the place of the {name}'s sensor is not known (its origin lies outside the cloud, or near and far "
-                "mix in one direction): what it looked through could not be tested"
+                f"the place of the {name}'s sensor is not known (its origin lies outside the cloud): "
+                "what it looked through could not be tested"
             )
 
 
@@ -73,6 +73,6 @@ def _in_favour(evidence: Mapping[str, float]) -> str:
     return (
         f"of the points that the other sensor looked at, {evidence['fitness_visible_source']:.0%} of the source's and "
         f"{evidence['fitness_visible_target']:.0%} of the target's have a neighbour there; "
-        f"{evidence['agreement_least']:.0%} or more agree along each axis, {evidence['looked_through']:.0%} were looked "
-        "through"
+        f"{evidence['agreement_least']:.0%} or more agree along each axis, "
+        f"{evidence['looked_through']:.0%} were looked through"
     )

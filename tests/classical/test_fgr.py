@@ -38,7 +38,7 @@ def test_finds_planted_poses(scene: Scene, rng: np.random.Generator, seed: int) 
 
 def test_lengths_are_metres(scene: Scene, rng: np.random.Generator) -> None:
     # Read as a share of the diameter, 0.1 would be metres wide, and outliers 0.8 m off would pull the pose.
-    matches, T, true = planted(0, n=600, inlier_ratio=1.0, noise=0.01)
+    matches, T, _ = planted(0, n=600, inlier_ratio=1.0, noise=0.01)
     target = matches.target.copy()
     target[:250] += [0.0, 0.0, 0.8]
     pose = Fgr(max_distance=0.1)(scene, Correspondences.of(matches.source, target), rng)

@@ -18,7 +18,7 @@ def test_equals_all_pairwise_distances(seed: int, n: int, m: int, d: int) -> Non
     exact = cdist(a, b)
     found = nearest(a, b)
     # float32 may take another of two neighbours that are equally far to four digits.
-    np.testing.assert_allclose(exact[np.arange(n), found.index], exact.min(axis=1), rtol=1e-3, atol=2e-2)
+    np.testing.assert_allclose(exact[np.arange(n), found.row], exact.min(axis=1), rtol=1e-3, atol=2e-2)
     np.testing.assert_allclose(found.distance, exact.min(axis=1), rtol=1e-3, atol=2e-2)
     np.testing.assert_allclose(found.second, np.sort(exact, axis=1)[:, 1], rtol=1e-3, atol=2e-2)
     mutual = exact.argmin(axis=0)[exact.argmin(axis=1)] == np.arange(n)
@@ -29,7 +29,7 @@ def test_a_target_has_one_mutual_partner_at_most() -> None:
     rng = np.random.default_rng(0)
     found = nearest(rng.normal(size=(700, 33)), rng.normal(size=(500, 33)))
     assert found.mutual.any()
-    assert np.bincount(found.index[found.mutual]).max() == 1
+    assert np.bincount(found.row[found.mutual]).max() == 1
 
 
 def test_equal_descriptors_have_one_partner_at_most() -> None:
@@ -38,7 +38,7 @@ def test_equal_descriptors_have_one_partner_at_most() -> None:
     source = np.concatenate([target[:10], np.repeat(target[:1], 300, axis=0)])
     found = nearest(source, target)
     assert found.mutual[1:10].all()
-    assert (found.mutual & (found.index == 0)).sum() <= 1
+    assert (found.mutual & (found.row == 0)).sum() <= 1
 
 
 def test_a_single_target_has_no_second() -> None:

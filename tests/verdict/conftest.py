@@ -1,0 +1,77 @@
+# SPDX-License-Identifier: MIT
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+import worlds
+from numpy.typing import NDArray
+
+from hybridreg import se3
+from hybridreg.classical.voxel import VoxelGrid
+from hybridreg.cloud import PointCloud
+from hybridreg.pair import Pair
+from hybridreg.scene import Scene
+
+Array = NDArray[np.float64]
+
+
+class Made(NamedTuple):
+    scene: Scene
+    truth: Array  # T_target_source
+
+
+def make(world: worlds.World, source: str, target: str, T_world_source: Array, T_world_target: Array) -> Made:
+    rng = np.random.default_rng(1)
+    clouds = [
+        worlds.scan(world, *where, rng) for where in ((source, T_world_source), (target, T_world_target))
+    ]
+    pair = Pair(source=PointCloud.of(clouds[0]), target=PointCloud.of(clouds[1]))
+    return Made(VoxelGrid()(pair), se3.inverse(T_world_target) @ T_world_source)
+
+
+@pytest.fixture(scope="session")
+def crossing() -> Made:
+    """A ring sensor that hangs upside down, 4 m from another make of sensor."""
+    world = worlds.street(np.random.default_rng(3), crossing=True)
+    return make(
+        world,
+        "rings32",
+        "rings64",
+        worlds.sensor_pose(4, 0.3, 1.9, 40, 180),
+        worlds.sensor_pose(0, 0, 1.8, 0),
+    )
+
+
+@pytest.fixture(scope="session")
+def fan() -> Made:
+    """A narrow raster against a full circle, on a yard."""
+    world = worlds.yard(np.random.default_rng(5))
+    return make(
+        world, "raster", "rings64", worlds.sensor_pose(2, 0, 1.5, 25), worlds.sensor_pose(0, 0, 1.8, 0)
+    )
+
+
+@pytest.fixture(scope="session")
+def corridor() -> Made:
+    """Two walls, a floor and a ceiling without an end in sight."""
+    world = worlds.World(ceiling=2.6)
+    for y in (-1.3, 1.3):
+        world.box(0, y, (400.0, 0.2, 2.6))
+    return make(
+        world, "rings32", "rings64", worlds.sensor_pose(1, 0, 1.2, 10), worlds.sensor_pose(0, 0, 1.3, 0)
+    )
+
+
+@pytest.fixture(scope="session")
+def elsewhere(crossing: Made) -> Scene:
+    """The crossing's target with a source from another street."""
+    other = make(
+        worlds.street(np.random.default_rng(11)),
+        "rings32",
+        "rings64",
+        worlds.sensor_pose(0, 0, 1.8, 40),
+        worlds.sensor_pose(3, 0, 1.8, 0),
+    )
+    return VoxelGrid()(Pair(source=other.scene.pair.source, target=crossing.scene.pair.target))
