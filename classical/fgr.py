@@ -28,8 +28,8 @@ class Fgr(Stage):
     Parameters
     ----------
     max_distance : float or None
-        Metres; residuals beyond it count for little at the end. None takes the scene's spacing. (Open3D's own
-        default, 0.025 of the cloud's diameter, is metres on a LiDAR scan.)
+        Metres; residuals beyond it count for little at the end. None takes the spacing of the matches, or of the
+        scene where they tell none. (Open3D's own default, 0.025 of the cloud's diameter, is metres on a LiDAR scan.)
     division_factor : float
         The basin shrinks by this factor every fourth iteration.
     iterations : int
@@ -64,7 +64,7 @@ class Fgr(Stage):
         if len(rows) < _FEWEST:
             scene.note(f"FGR needs at least {_FEWEST} matches, it got {len(rows)}")
             return Pose.unknown(len(matches))
-        max_distance = self.max_distance or scene.spacing
+        max_distance = self.max_distance or matches.spacing or scene.spacing
         T = self._solve(matches.source[rows], matches.target[rows], max_distance, int(rng.integers(2**31)))
         if T is None:
             scene.note("FGR found no pose: too few matches agree with one another")

@@ -37,8 +37,8 @@ class Ransac(Stage):
     sample_size : int
         Matches in a sample. Three fix a pose and are likeliest to be all right; the papers' RANSAC-50K has 4.
     max_distance : float or None
-        Metres; a match agrees with a pose when its residual is smaller. None takes 1.5 times the scene's
-        spacing.
+        Metres; a match agrees with a pose when its residual is smaller. None takes 1.5 times the spacing
+        of the matches, or of the scene where they tell none.
     edge_ratio : float in [0, 1]
         The shorter of an edge's two lengths over the longer must reach this. 0 lets all samples through.
     confidence : float in [0, 1]
@@ -87,7 +87,7 @@ class Ransac(Stage):
         rows = self._rows(scene, matches, rng)
         if len(rows) < 3:
             return Pose.unknown(len(matches))
-        max_distance = self.max_distance or 1.5 * scene.spacing
+        max_distance = self.max_distance or 1.5 * (matches.spacing or scene.spacing)
         source, target, weight = matches.source[rows], matches.target[rows], matches.weight[rows]
         # One BLAS thread: how a matrix product is split among threads may decide the last bit of its entries.
         with threadpool_limits(limits=1, user_api="blas"):

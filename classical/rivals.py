@@ -35,7 +35,7 @@ def modes(
     while len(left) and len(found) < _MOST_MODES and counts[left[0]] >= least:
         seed = consensus.support(poses[left[0]])
         found.append(consensus.refit(seed) if refit else seed)
-        near = _same(poses[left], seed.T, centre, consensus) | _same(
+        near = same(poses[left], seed.T, centre, consensus) | same(
             poses[left], found[-1].T, centre, consensus
         )
         near[0] = True
@@ -50,11 +50,12 @@ def _distinct(found: list[Support], centre: Array, consensus: Consensus) -> list
     # Two hypotheses far apart may have been refitted to one pose.
     kept: list[Support] = []
     for one in found:
-        if not any(_same(one.T[None], other.T, centre, consensus)[0] for other in kept):
+        if not any(same(one.T[None], other.T, centre, consensus)[0] for other in kept):
             kept.append(one)
     return kept
 
 
-def _same(poses: Array, T: Array, centre: Array, consensus: Consensus) -> NDArray[np.bool_]:
+def same(poses: Array, T: Array, centre: Array, consensus: Consensus) -> NDArray[np.bool_]:
+    """Which of the poses (B, 4, 4) are one answer with T (4, 4), seen at `centre` (3,)."""
     degrees, metres = distances(poses, T, centre)
     return (degrees < _SAME_DEG) & (metres < _SAME_DISTANCES * consensus.max_distance)

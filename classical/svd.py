@@ -101,7 +101,7 @@ class WeightedSvd(Stage):
     ----------
     max_distance : float or None
         Metres; matches nearer than this under the pose are reported as inliers. None takes 1.5 times the
-        scene's spacing.
+        spacing of the matches, or of the scene where they tell none.
     """
 
     max_distance: float | None = None
@@ -118,5 +118,5 @@ class WeightedSvd(Stage):
             return Pose.unknown(len(matches))
         if status == "degenerate":
             scene.note("the matches lie on one line or in one place: the rotation about it is arbitrary")
-        within = self.max_distance or 1.5 * scene.spacing
+        within = self.max_distance or 1.5 * (matches.spacing or scene.spacing)
         return Pose(T, inliers=np.linalg.norm(se3.apply(T, matches.source) - matches.target, axis=1) < within)

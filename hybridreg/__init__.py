@@ -31,6 +31,10 @@ if TYPE_CHECKING:
     from hybridreg.classical.visibility import Visibility
     from hybridreg.classical.voxel import VoxelGrid
     from hybridreg.cloud import PointCloud
+    from hybridreg.learned.stages.geotransformer import GeoTransformer
+    from hybridreg.learned.stages.lgr import Lgr
+    from hybridreg.learned.stages.omp import Omp
+    from hybridreg.learned.stages.vgam import Vgam
     from hybridreg.matches import Correspondences, Overlap, Pose
     from hybridreg.pair import LabelledPair, Pair
     from hybridreg.pipeline import Pipeline, Trace
@@ -53,6 +57,10 @@ _WHERE = {
     "hybridreg.classical.visibility": ["Visibility"],
     "hybridreg.classical.voxel": ["VoxelGrid"],
     "hybridreg.cloud": ["PointCloud"],
+    "hybridreg.learned.stages.geotransformer": ["GeoTransformer"],
+    "hybridreg.learned.stages.lgr": ["Lgr"],
+    "hybridreg.learned.stages.omp": ["Omp"],
+    "hybridreg.learned.stages.vgam": ["Vgam"],
     "hybridreg.matches": ["Correspondences", "Overlap", "Pose"],
     "hybridreg.pair": ["LabelledPair", "Pair"],
     "hybridreg.pipeline": ["Pipeline", "Trace"],

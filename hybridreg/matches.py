@@ -45,6 +45,9 @@ class Correspondences:
         The superpoint pair that a match came from; local-to-global estimation needs it.
     source_index, target_index : (K,) int64 or None
         Rows of the levels' points, where the matches are such.
+    spacing : float or None
+        Typical distance of the points among which partners were sought, metres: no match can be nearer to right.
+        None means the scene's own; a network that works on a grid of its own tells that grid's.
     """
 
     source: Array
@@ -53,6 +56,7 @@ class Correspondences:
     group: Indices | None = None
     source_index: Indices | None = None
     target_index: Indices | None = None
+    spacing: float | None = None
 
     def __post_init__(self) -> None:
         n = len(self.source)

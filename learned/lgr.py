@@ -21,7 +21,7 @@ class LgrEstimate:
     transform: Tensor  # (4, 4): T_target_source
     inliers: Tensor  # (C,) bool: within the acceptance radius of the final pose
     hypotheses: int  # groups that proposed a pose; 0 means that the start was a fit to everything
-    rivals: Tensor  # (r, 4, 4): all proposals, most votes first, at most 8
+    proposals: Tensor  # (g, 4, 4): of all groups that made one, most votes first
 
 
 def local_to_global(
@@ -64,7 +64,7 @@ def local_to_global(
         inliers = _inliers(transform, target, source, config.acceptance_radius)
         transform = weighted_procrustes(source, target, weight * inliers)
     inliers = _inliers(transform, target, source, config.acceptance_radius)
-    return LgrEstimate(transform, inliers, len(proposals), proposals[order[:8]])
+    return LgrEstimate(transform, inliers, len(proposals), proposals[order])
 
 
 def _propose(target: Tensor, source: Tensor, weight: Tensor, group: Tensor, min_group: int) -> Tensor:

@@ -13,7 +13,7 @@ from torch.nn import functional as F
 from hybridreg.learned.backbone import KpconvFpn
 from hybridreg.learned.batch import Batch
 from hybridreg.learned.blocks import pad_row
-from hybridreg.learned.config import NetworkConfig
+from hybridreg.learned.config import NetworkConfig, OmpConfig
 from hybridreg.learned.geotransformer import GeoTransformerBlock
 from hybridreg.learned.image_encoder import ImageEncoder, ImageFeatures
 from hybridreg.learned.omp import OverlapLogits, OverlapPredictor
@@ -22,7 +22,7 @@ from hybridreg.learned.patches import Patches, build_patches
 from hybridreg.learned.point_matching import PointMatches, gather_matches
 from hybridreg.learned.pyramid import Pyramid
 from hybridreg.learned.sinkhorn import OptimalTransport
-from hybridreg.learned.superpoint_mask import Kept, cap, keep_all, keep_predicted
+from hybridreg.learned.superpoint_mask import Kept, choose
 from hybridreg.learned.superpoint_matching import SuperpointMatches, match_superpoints
 from hybridreg.learned.vgam import VisualGeometricAttention
 
@@ -146,12 +146,9 @@ class RegistrationNetwork(nn.Module):
         return target, source
 
     def _keep(self, cloud: CloudEncoding, logits: Tensor | None) -> Kept:
+        probability = None if logits is None else torch.sigmoid(logits.detach())
         limit = self.config.matching.max_superpoints
-        if logits is None or self.config.omp is None:
-            sizes = torch.bincount(cloud.patches.owner, minlength=len(cloud.nodes))
-            return cap(keep_all(cloud.patches), sizes, limit)
-        probability = torch.sigmoid(logits.detach())
-        return cap(keep_predicted(probability, cloud.patches, self.config.omp), probability, limit)
+        return choose(cloud.patches, probability, self.config.omp or OmpConfig(), limit)
 
     def attend(self, encoding: Encoding, kept: tuple[Kept, Kept]) -> tuple[Tensor, Tensor]:
         """Unit features (m, d), (n, d) of the kept superpoints after VGAM and the GeoTransformer block."""

@@ -47,6 +47,14 @@ def keep_all(patches: Patches) -> Kept:
     return Kept(torch.arange(len(patches.mask), device=patches.mask.device))
 
 
+def choose(patches: Patches, probability: Tensor | None, config: OmpConfig, limit: int) -> Kept:
+    """Superpoints of one cloud that go on: by their probability (n,) of overlap, or all where none is known."""
+    if probability is None:
+        sizes = torch.bincount(patches.owner, minlength=len(patches.mask))
+        return cap(keep_all(patches), sizes, limit)
+    return cap(keep_predicted(probability, patches, config), probability, limit)
+
+
 def cap(kept: Kept, priority: Tensor, limit: int) -> Kept:
     """At most ``limit`` superpoints, by ``priority`` (n,): the structure embedding is n x n."""
     if len(kept.index) <= limit:

@@ -60,6 +60,18 @@ def from_pretrained(name_or_folder: str | os.PathLike[str]) -> RegistrationNetwo
     return network.eval()
 
 
+def find_files(name_or_folder: str | os.PathLike[str]) -> list[Path]:
+    """Configuration and weights of a folder, or of a name.
+
+    Raises
+    ------
+    FileNotFoundError
+        As `from_pretrained`.
+    """
+    folder = _find(name_or_folder)
+    return [folder / CONFIG_FILE, folder / WEIGHTS_FILE]
+
+
 def _find(name_or_folder: str | os.PathLike[str]) -> Path:
     for folder in (Path(name_or_folder), _SHIPPED / str(name_or_folder)):
         if (folder / CONFIG_FILE).is_file() and (folder / WEIGHTS_FILE).is_file():

@@ -76,7 +76,7 @@ def judge(scene: Scene, pose: Pose, matches: Correspondences) -> Judgement:
     held = information.measure(agreement, target)
     found = rivals.find(source, target, pose.T, agreement, held, pose.rivals, spacing) if pose.found else []
     evidence = evidence_of(agreement, held, found, target)
-    evidence["matches_agreeing"] = _agreeing(matches, pose.T, 2.0 * scene.spacing)
+    evidence["matches_agreeing"] = _agreeing(matches, pose.T, 2.0 * (matches.spacing or scene.spacing))
     probability = confidence(evidence) if pose.found else 0.0
     max_distance = 2.0 * scene.spacing
     fitness, fitness_target = _fitness(scene, pose.T, max_distance)

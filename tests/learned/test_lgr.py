@@ -75,7 +75,7 @@ def test_one_good_group_of_many_is_enough(seed: int) -> None:
     assert torch.allclose(found.transform, pose(seed), atol=1e-4)
     assert found.inliers.sum() >= 20
     assert found.hypotheses == 7
-    assert found.rivals.shape == (7, 4, 4)
+    assert found.proposals.shape == (7, 4, 4)
 
 
 def test_groups_too_small_to_propose() -> None:

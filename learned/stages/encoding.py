@@ -1,0 +1,61 @@
+# SPDX-License-Identifier: MIT
+"""A pair as a network sees it, encoded once a run for all stages that use the same network."""
+
+from __future__ import annotations
+
+import math
+
+import torch
+
+from hybridreg.learned.batch import Batch, make_batch
+from hybridreg.learned.network import Encoding
+from hybridreg.learned.stages.network_stage import NetworkStage
+from hybridreg.scene import Scene
+
+# Spacings that differ by less are one; beyond the second factor the scene itself may be of another size.
+_SAME, _ANOTHER_SCALE = 0.01, 2.0
+
+
+def encode(scene: Scene, stage: NetworkStage) -> Encoding:
+    """The pair after the encoders of a stage's network."""
+    if stage.random_parts():
+        scene.note(f"{type(stage).__name__} ran with random weights (untrained=True)")
+    return scene.shared(("encoding", stage.network_name()), lambda: _encode(scene, stage))
+
+
+def _encode(scene: Scene, stage: NetworkStage) -> Encoding:
+    network = stage.network()
+    if network.image_encoder is not None and not (stage.sees() and scene.pair.image is not None):
+        why = "no image" if scene.pair.image is None else "the network was trained without images"
+        scene.note(f"{why}: it works from the clouds alone, a learned token in the image's place")
+    with torch.inference_mode():
+        return network.encode(_batch(scene, stage))
+
+
+def _batch(scene: Scene, stage: NetworkStage) -> Batch:
+    # A network's filters have the size of the voxel that it was trained with. Levels of that voxel are taken as
+    # they are; others would show it a density that it never saw, so it makes its own from the clouds.
+    config = stage.network().config
+    voxel = config.backbone.voxel
+    ready = all(math.isclose(s, voxel, rel_tol=_SAME) for s in (scene.source.spacing, scene.target.spacing))
+    if not ready:
+        scene.note(_mismatch(scene.spacing, voxel))
+    source, target = (scene.source, scene.target) if ready else (scene.pair.source, scene.pair.target)
+    return make_batch(
+        target.points,
+        source.points,
+        config,
+        image=scene.pair.image if stage.sees() else None,
+        subsample=not ready,
+        device=stage.device,
+    )
+
+
+def _mismatch(spacing: float, voxel: float) -> str:
+    text = (
+        f"the network was trained with a voxel of {voxel:.3g} m and made its own grid of it; the other stages work "
+        f"at {spacing:.3g} m"
+    )
+    if max(spacing / voxel, voxel / spacing) > _ANOTHER_SCALE:
+        return f"{text}: is the scene of the size that the network was trained for?"
+    return text

@@ -1,0 +1,130 @@
+# SPDX-License-Identifier: MIT
+"""Local-to-global registration as a stage."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+from threadpoolctl import threadpool_limits
+
+from hybridreg import se3
+from hybridreg.classical.consensus import Consensus
+from hybridreg.classical.rivals import modes, same
+from hybridreg.classical.svd import kabsch
+from hybridreg.matches import Correspondences, Pose
+from hybridreg.scene import Scene
+from hybridreg.stage import Stage
+
+if TYPE_CHECKING:
+    from hybridreg.learned.lgr import LgrEstimate
+
+Array = NDArray[np.float64]
+Rows = NDArray[np.int64]
+
+# The published fit adds 1e-5 to the sum of the weights, which pulls it to the origin where they are faint.
+_LARGEST_WEIGHT = 1e6
+
+
+@dataclass(frozen=True, kw_only=True)
+class Lgr(Stage):
+    """Each group of matches proposes a pose, all matches vote, those that agree refine it (GeoTransformer, 3.4).
+
+    Parameters
+    ----------
+    max_distance : float or None
+        Metres; a match agrees with a pose when its residual is smaller. None takes the spacing of the points
+        that were matched where the matcher tells it (twice the voxel of the published networks, as they do), and
+        otherwise twice the scene's spacing.
+    min_group : int
+        Groups of fewer matches propose nothing, but vote.
+    steps : int
+        Fits to the matches that agree.
+    max_votes : int or None
+        At most so many matches vote, those of the largest weight.
+    rival_share : float in [0, 1]
+        A pose far from the best one is a rival when its support is at least this share of the best one's.
+    """
+
+    max_distance: float | None = None
+    min_group: int = 3
+    steps: int = 5
+    max_votes: int | None = None
+    rival_share: float = 0.5
+
+    needs: ClassVar[frozenset[str]] = frozenset({"matches", "group"})
+
+    def __post_init__(self) -> None:
+        if self.max_distance is not None and not self.max_distance > 0.0:
+            raise ValueError(f"max_distance={self.max_distance} must be a positive length in metres")
+        if self.min_group < 3:
+            raise ValueError(f"min_group={self.min_group} must be at least 3: fewer matches fix no pose")
+        if self.steps < 1:
+            raise ValueError(f"steps={self.steps} must be at least 1")
+        if self.max_votes is not None and self.max_votes < 1:
+            raise ValueError(f"max_votes={self.max_votes} must be at least 1")
+        if not 0.0 <= self.rival_share <= 1.0:
+            raise ValueError(f"rival_share={self.rival_share} must lie in [0, 1]")
+
+    def __call__(self, scene: Scene, matches: Correspondences, rng: np.random.Generator) -> Pose:
+        rows = _usable(matches)
+        if len(rows) < 3:
+            return Pose.unknown(len(matches))
+        max_distance = self.max_distance or matches.spacing or 2.0 * scene.spacing
+        with threadpool_limits(limits=1, user_api="blas"):
+            found = self._estimate(scene, matches, rows, max_distance)
+            T: Array = found.transform.numpy()
+            residual = np.linalg.norm(se3.apply(T, matches.source[rows]) - matches.target[rows], axis=1)
+            inliers = np.zeros(len(matches), dtype=bool)
+            inliers[rows] = residual < max_distance
+            _, status = kabsch(matches.source[inliers], matches.target[inliers], matches.weight[inliers])
+            if status in ("few", "nan"):
+                return Pose.unknown(len(matches))
+            if status == "degenerate":
+                scene.note("the matches that agree lie on one line: the rotation about it is arbitrary")
+            rivals = self._rivals(matches, rows, T, found.proposals.numpy(), max_distance)
+        return Pose(T, inliers=inliers, rivals=rivals)
+
+    def _estimate(
+        self, scene: Scene, matches: Correspondences, rows: Rows, max_distance: float
+    ) -> LgrEstimate:
+        import torch
+
+        from hybridreg.learned.config import LgrConfig
+        from hybridreg.learned.lgr import local_to_global
+
+        if matches.group is None:
+            raise ValueError(
+                f"pair {scene.pair.id}: local-to-global estimation needs to know which matches belong together; "
+                f"give the {len(matches)} matches a group (K,), or use an estimator that needs none"
+            )
+        weight = matches.weight[rows] * (_LARGEST_WEIGHT / matches.weight[rows].max())
+        columns = (matches.target[rows], matches.source[rows], weight, matches.group[rows])
+        config = LgrConfig(
+            acceptance_radius=max_distance,
+            min_group=self.min_group,
+            steps=self.steps,
+            max_votes=self.max_votes,
+        )
+        target, source, weights, group = (torch.from_numpy(np.array(column)) for column in columns)
+        found = local_to_global(target, source, weights, group, config)
+        if found.hypotheses == 0:
+            scene.note(f"LGR: no group has {self.min_group} matches, it started from a fit to all of them")
+        return found
+
+    def _rivals(
+        self, matches: Correspondences, rows: Rows, T: Array, proposals: Array, max_distance: float
+    ) -> Array:
+        source, target, weight = matches.source[rows], matches.target[rows], matches.weight[rows]
+        consensus = Consensus(source, target, weight, max_distance)
+        poses = np.concatenate([T[None], proposals])
+        found = modes(consensus, poses, consensus.counts(poses), refit=True, share=self.rival_share)
+        far = np.array([one.T for one in found]).reshape(-1, 4, 4)
+        return far[~same(far, T, np.median(source, axis=0), consensus)]
+
+
+def _usable(matches: Correspondences) -> Rows:
+    finite = np.isfinite(matches.source).all(axis=1) & np.isfinite(matches.target).all(axis=1)
+    return np.flatnonzero(finite & (matches.weight > 0.0) & np.isfinite(matches.weight))

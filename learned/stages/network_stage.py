@@ -1,0 +1,116 @@
+# SPDX-License-Identifier: MIT
+"""What the stages that run a network have in common: where its weights are, and on which device it works."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, ClassVar
+
+from hybridreg.stage import Stage
+
+if TYPE_CHECKING:
+    from typing_extensions import Self
+
+    from hybridreg.learned.network import RegistrationNetwork
+    from hybridreg.learned.stages.networks import Loaded, NetworkName
+
+
+@dataclass(frozen=True, kw_only=True)
+class NetworkStage(Stage):
+    """A stage with a network behind it.
+
+    Parameters
+    ----------
+    weights : str or None
+        A folder that `save_pretrained` wrote, the name of weights that come with the package, or one of
+        GeoTransformer's published checkpoints (`.pth.tar`). None stands for random weights.
+    size : str or None
+        Configuration by name, see `hybridreg.learned.sizes.named_config`: of random weights ("nano" if not
+        given), or of a checkpoint (found from its tensors if not given). Folders bring their own.
+    device : str
+        As torch names it: "cpu", "cuda", "cuda:1".
+    untrained : bool
+        Run although the weights are random.
+    """
+
+    weights: str | None = None
+    size: str | None = None
+    device: str = "cpu"
+    untrained: bool = False
+
+    # Parts that must have been trained, and whether a network of random weights looks at images.
+    parts: ClassVar[frozenset[str]] = frozenset({"backbone"})
+    image: ClassVar[bool] = True
+
+    def __post_init__(self) -> None:
+        if self.weights is not None:
+            object.__setattr__(self, "weights", os.fspath(self.weights))
+        elif not self.untrained:
+            raise ValueError(
+                f"{type(self).__name__}: without weights=... these weights are random; name a folder or weights "
+                "that come with the package, or insist with untrained=True"
+            )
+
+    @classmethod
+    def from_pretrained(cls, name_or_folder: str | os.PathLike[str], **fields: Any) -> Self:
+        """Stage of trained weights, which are read at once so that a wrong file is told here.
+
+        Raises
+        ------
+        FileNotFoundError
+            No such folder and no such name.
+        ValueError
+            Damaged weights, weights of another network, or random ones.
+        """
+        stage = cls(weights=os.fspath(name_or_folder), **fields)
+        stage.network()
+        return stage
+
+    def save_pretrained(self, folder: str | os.PathLike[str]) -> None:
+        """Write the network's weights and configuration into a folder."""
+        from hybridreg.learned.weights import save_pretrained
+
+        save_pretrained(self.network(), folder)
+
+    def network(self) -> RegistrationNetwork:
+        """The network in evaluation mode, read when it is first asked for.
+
+        Raises
+        ------
+        ValueError
+            As `from_pretrained`.
+        """
+        loaded = self._load()
+        self.check(loaded.network)
+        random = self.random_parts()
+        if random and not self.untrained:
+            raise ValueError(
+                f"{type(self).__name__}: these weights are random: {', '.join(random)} of {self.weights!r} was never "
+                "trained; name other weights, or insist with untrained=True"
+            )
+        return loaded.network
+
+    def random_parts(self) -> list[str]:
+        """Those of this stage's parts that were never trained."""
+        return sorted(self.parts & self._load().untrained)
+
+    def sees(self) -> bool:
+        """Has the network learned to look at images? Insisted-on random weights count as if they had."""
+        loaded = self._load()
+        blind = "image_encoder" in loaded.untrained and not self.random_parts()
+        return loaded.network.image_encoder is not None and not blind
+
+    def _load(self) -> Loaded:
+        from hybridreg.learned.stages.networks import load
+
+        return load(self.network_name())
+
+    def network_name(self) -> NetworkName:
+        """What tells this stage's network from others; stages of one name share one encoding of a pair."""
+        from hybridreg.learned.stages.networks import NetworkName
+
+        return NetworkName(self.weights, self.size, self.device, self.weights is None and self.image)
+
+    def check(self, network: RegistrationNetwork) -> None:
+        """Refuse a network that lacks what this stage runs."""

@@ -1,0 +1,82 @@
+# SPDX-License-Identifier: MIT
+"""Loaded networks, kept outside of the stages so that these stay plain values."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from pathlib import Path
+from typing import NamedTuple
+
+import torch
+
+from hybridreg.learned.network import RegistrationNetwork
+from hybridreg.learned.sizes import named_config
+from hybridreg.learned.untrained import untrained_parts
+from hybridreg.learned.weights import find_files, from_pretrained, load_official
+
+_DEFAULT_SIZE = "nano"
+_CHECKPOINTS = (".tar", ".pth", ".pt")
+# Networks held at a time: OMP and a matcher of other weights, each beside the one before it.
+_HELD = 4
+
+
+class NetworkName(NamedTuple):
+    """All that tells one network from another."""
+
+    weights: str | None  # a folder, the name of shipped weights, a checkpoint; None for random weights
+    size: str | None
+    device: str
+    image: bool  # of a network of random weights: has it OMP and VGAM?
+
+
+class Loaded(NamedTuple):
+    """A network in evaluation mode, and which of its parts were never trained."""
+
+    network: RegistrationNetwork
+    untrained: frozenset[str]
+
+
+def load(name: NetworkName) -> Loaded:
+    """The network of a name, read once a process and again when its files changed.
+
+    Raises
+    ------
+    FileNotFoundError
+        No such weights.
+    ValueError
+        Damaged weights (the tensor is named), or a device that this machine lacks.
+    """
+    return _load(name, _stamp(name.weights))
+
+
+@lru_cache(maxsize=_HELD)
+def _load(name: NetworkName, stamp: tuple[int, ...]) -> Loaded:
+    if name.device.startswith("cuda") and not torch.cuda.is_available():
+        raise ValueError(f"device={name.device!r}: torch finds no GPU here; use device='cpu'")
+    # A module draws weights when it is made; the caller's generator must not notice.
+    with torch.random.fork_rng(devices=[]):
+        torch.default_generator.manual_seed(0)
+        network = _make(name)
+    return Loaded(network.to(name.device).eval().requires_grad_(False), untrained_parts(network))
+
+
+def _make(name: NetworkName) -> RegistrationNetwork:
+    if name.weights is None:
+        return RegistrationNetwork(named_config(name.size or _DEFAULT_SIZE, omp=name.image, vgam=name.image))
+    if _is_checkpoint(name.weights):
+        return load_official(name.weights, name.size)
+    if name.size is not None:
+        raise ValueError(f"size={name.size!r}: the weights {name.weights!r} bring their own configuration")
+    return from_pretrained(name.weights)
+
+
+def _is_checkpoint(weights: str) -> bool:
+    return weights.endswith(_CHECKPOINTS)
+
+
+def _stamp(weights: str | None) -> tuple[int, ...]:
+    if weights is None:
+        return ()
+    files = [Path(weights)] if _is_checkpoint(weights) else find_files(weights)
+    found = [file.stat() for file in files if file.is_file()]
+    return tuple(n for stat in found for n in (stat.st_mtime_ns, stat.st_size))

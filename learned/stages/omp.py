@@ -1,0 +1,53 @@
+# SPDX-License-Identifier: MIT
+"""The overlapping mask predictor as a stage."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, ClassVar
+
+from hybridreg.learned.stages.network_stage import NetworkStage
+from hybridreg.matches import Overlap
+from hybridreg.scene import Scene
+
+if TYPE_CHECKING:
+    from hybridreg.learned.network import RegistrationNetwork
+
+
+@dataclass(frozen=True, kw_only=True)
+class Omp(NetworkStage):
+    """Which points does the other cloud share, judged by superpoint features and the image (Cross3DReg, 3.2).
+
+    Each point takes the probability of its superpoint, so that any matcher can use it. A matcher of the same
+    weights shares the encoding. Without an image, a network whose OMP does not look at the other cloud knows
+    nothing, and every point counts.
+    """
+
+    parts: ClassVar[frozenset[str]] = frozenset({"backbone", "omp"})
+
+    def __call__(self, scene: Scene) -> Overlap:
+        import torch
+
+        from hybridreg.learned.stages.arrays import array
+        from hybridreg.learned.stages.encoding import encode
+        from hybridreg.learned.stages.spreading import spread
+
+        network, encoding = self.network(), encode(scene, self)
+        with torch.inference_mode():
+            logits = network.predict_overlap(encoding)
+            assert logits is not None, "check() lets no network without OMP through"
+            if not logits.informed:
+                scene.note(
+                    "OMP has neither an image nor sight of the other cloud to go by: every point counts"
+                )
+                return Overlap.full(len(scene.source), len(scene.target))
+            source, target = array(torch.sigmoid(logits.source)), array(torch.sigmoid(logits.target))
+        return Overlap(
+            spread(source, array(encoding.source.nodes), scene.source.points),
+            spread(target, array(encoding.target.nodes), scene.target.points),
+        )
+
+    def check(self, network: RegistrationNetwork) -> None:
+        """Refuse weights without an overlapping mask predictor."""
+        if network.omp is None:
+            raise ValueError(f"Omp: the weights {self.weights!r} hold no overlapping mask predictor")

@@ -1,0 +1,30 @@
+# SPDX-License-Identifier: MIT
+"""Visual-geometric matching as a stage."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, ClassVar
+
+from hybridreg.learned.stages.network_matcher import NetworkMatcher
+
+if TYPE_CHECKING:
+    from hybridreg.learned.network import RegistrationNetwork
+
+
+@dataclass(frozen=True, kw_only=True)
+class Vgam(NetworkMatcher):
+    """Superpoints look at the image and at their own cloud before GeoTransformer matches them (Cross3DReg, 3.3).
+
+    Works without an image too, from the clouds alone.
+    """
+
+    parts: ClassVar[frozenset[str]] = frozenset({"backbone", "vgam", "transformer"})
+
+    def check(self, network: RegistrationNetwork) -> None:
+        """Refuse weights without a visual-geometric attention."""
+        if network.vgam is None:
+            raise ValueError(
+                f"Vgam: the weights {self.weights!r} hold no visual-geometric attention; GeoTransformer "
+                '("match.geotransformer") takes them'
+            )
