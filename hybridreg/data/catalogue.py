@@ -17,6 +17,7 @@ ENTRY_POINTS = "hybridreg.datasets"
 # A loader takes the text after the colon and gives a sequence of labelled pairs.
 BUILT_IN = {
     "folder": "hybridreg.data.folder:PairFolder",
+    "sim": "hybridreg.data.simulated:Simulated",
 }
 
 

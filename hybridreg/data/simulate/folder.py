@@ -19,6 +19,7 @@ from hybridreg.data.simulate.jpeg import decode
 from hybridreg.data.simulate.labelled import pair_id
 from hybridreg.data.simulate.overlaps import thin
 from hybridreg.data.simulate.splits import VERSION, pair_number
+from hybridreg.data.simulate.tiers import tier_named
 from hybridreg.pair import LabelledPair, Pair
 
 
@@ -82,18 +83,34 @@ def read_pair(folder: Path) -> LabelledPair:
 
 
 def write_one(out: Path, tier: str, split: str, seed: int, index: int, voxel: float | None) -> Path:
-    """Draw pair `index` and write it below `out`; a pair that lies there whole already is kept."""
+    """Draw pair `index` and write it below `out`; a pair that lies there whole already is kept.
+
+    Raises
+    ------
+    ValueError
+        Where the pair that lies there was thinned otherwise, or made by another version.
+    """
     folder = out / f"{tier}-{split}-{seed}-{index:06d}"
-    if not (folder / "meta.json").is_file():
-        facts = {
-            "tier": tier,
-            "split": split,
-            "seed": seed,
-            "index": index,
-            "id": pair_id(split, tier, seed, index),
-        }
-        write_pair(folder, draw(tier, pair_number(split, seed, index)), facts, voxel)
-    return folder
+    if (folder / "meta.json").is_file():
+        _check_kept(folder, voxel)
+        return folder
+    facts = {
+        "tier": tier,
+        "split": split,
+        "seed": seed,
+        "index": index,
+        "id": pair_id(split, tier, seed, index),
+    }
+    return write_pair(folder, draw(tier, pair_number(split, seed, index)), facts, voxel)
+
+
+def _check_kept(folder: Path, voxel: float | None) -> None:
+    meta = json.loads((folder / "meta.json").read_text())
+    for key, now in (("version", VERSION), ("voxel", voxel)):
+        if meta.get(key) != now:
+            raise ValueError(
+                f"{folder}: holds a pair of {key} {meta.get(key)}, not {now}; write to another folder"
+            )
 
 
 def write_pairs(
@@ -109,8 +126,26 @@ def write_pairs(
     """Write `pairs` pairs below `out`, yielding each folder as it is done, in order.
 
     An interrupted run goes on where it stopped. `voxel=0.25` makes a pair some 250 kB, 5 to 6 bytes a point.
+
+    Raises
+    ------
+    ValueError
+        Before anything is written: an unknown tier or split, a seed or number of pairs outside it, a voxel of
+        no width.
     """
+    tier_named(tier)
+    if pairs < 1:
+        raise ValueError(f"pairs={pairs}; ask for one at least")
+    pair_number(split, seed, pairs - 1)
+    if voxel is not None and not 0 < voxel < np.inf:
+        raise ValueError(f"voxel={voxel} m must be positive")
+    return _written(Path(out), tier, split, seed, pairs, voxel, workers)
+
+
+def _written(
+    out: Path, tier: str, split: str, seed: int, pairs: int, voxel: float | None, workers: int
+) -> Iterator[Path]:
     from joblib import Parallel, delayed
 
-    jobs = (delayed(write_one)(Path(out), tier, split, seed, index, voxel) for index in range(pairs))
+    jobs = (delayed(write_one)(out, tier, split, seed, index, voxel) for index in range(pairs))
     yield from Parallel(n_jobs=workers, return_as="generator")(jobs)

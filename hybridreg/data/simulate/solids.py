@@ -33,9 +33,7 @@ def _repeat(template: np.ndarray, copies: int, stride: int) -> np.ndarray:
     return (template[None] + (np.arange(copies) * stride)[:, None, None]).reshape(-1, 3)
 
 
-def boxes(
-    base: np.ndarray, size: np.ndarray, yaw: float | np.ndarray, material: str, tint: Colour
-) -> Mesh:
+def boxes(base: np.ndarray, size: np.ndarray, yaw: float | np.ndarray, material: str, tint: Colour) -> Mesh:
     """Boxes standing on `base` (n,3) with edges `size` (n,3), turned by `yaw` (n,) radians; open below."""
     base = np.atleast_2d(base)
     n = len(base)
