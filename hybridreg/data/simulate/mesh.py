@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -53,8 +53,9 @@ class Mesh:
     def moved(self, yaw: float, offset: Sequence[float]) -> Mesh:
         """Turned by `yaw` radians about z, then shifted by `offset` (3,)."""
         c, s = np.cos(yaw), np.sin(yaw)
-        turn = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
-        return replace(self, vertices=(self.vertices @ turn.T + np.asarray(offset)).astype(np.float32))
+        turn = np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]], np.float32)
+        vertices = self.vertices @ turn + np.asarray(offset, np.float32)
+        return Mesh(vertices, self.faces, self.material, self.tint)
 
 
 EMPTY = Mesh(
