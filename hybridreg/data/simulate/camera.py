@@ -63,13 +63,13 @@ def photograph(
     hits = with_ground(world.cast(origin, rays), origin, rays, surface)
     colour = np.empty_like(rays)
     solid, open_sky = np.flatnonzero(hits.face >= 0), np.flatnonzero(hits.face < 0)
-    colour[open_sky] = light.sky(rays[open_sky])
-    colour[solid] = _surfaces(world, origin, rays[solid], _rows(hits, solid), light)
+    colour[open_sky] = light.sky(rays.take(open_sky, axis=0))
+    colour[solid] = _surfaces(world, origin, rays.take(solid, axis=0), _rows(hits, solid), light)
     return _develop(colour.reshape(UP, ACROSS, 3), light, rng)
 
 
 def _rows(hits: Hits, rows: np.ndarray) -> Hits:
-    return Hits(hits.distance[rows], hits.normal[rows], hits.material[rows], hits.face[rows])
+    return Hits(hits.distance[rows], hits.normal.take(rows, axis=0), hits.material[rows], hits.face[rows])
 
 
 def _surfaces(world: World, origin: np.ndarray, rays: np.ndarray, hits: Hits, light: Light) -> np.ndarray:
@@ -88,7 +88,7 @@ def _surfaces(world: World, origin: np.ndarray, rays: np.ndarray, hits: Hits, li
 
 
 def _tints(world: World, hits: Hits) -> np.ndarray:
-    tint = world.tint[hits.face]
+    tint = world.tint.take(hits.face, axis=0)
     ground = np.flatnonzero(world.material[hits.face] == GROUND)
     tint[ground] = COLOUR[hits.material[ground]]
     return tint
@@ -114,7 +114,9 @@ def _develop(colour: np.ndarray, light: Light, rng: np.random.Generator) -> NDAr
     level = np.percentile(colour[::4, ::4].mean(-1), 65)
     gain = np.float32(0.45 / max(float(level), 1e-3) * light.exposure)
     v, u = np.linspace(-1, 1, UP, dtype=np.float32)[:, None], np.linspace(-1, 1, ACROSS, dtype=np.float32)
-    colour = colour * (gain * (1 - np.float32(light.vignette) * (u * u + v * v)))[..., None] * light.white_balance
+    colour = (
+        colour * (gain * (1 - np.float32(light.vignette) * (u * u + v * v)))[..., None] * light.white_balance
+    )
     curve = np.sqrt(np.maximum(colour / (1 + np.float32(0.35) * colour), 0))
     curve += rng.standard_normal(colour.shape, dtype=np.float32) * np.float32(light.noise)
     small = (np.clip(curve, 0, 1) * 255).astype(np.uint8)

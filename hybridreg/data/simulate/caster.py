@@ -137,7 +137,9 @@ class World:
             nearer = np.flatnonzero(t < distance)
             distance[nearer] = t[nearer]
             face[nearer] = other[nearer] + first
-        normal = self._normal[face]  # a ray without a hit has face -1: its normal is never used
+        normal = self._normal.take(
+            face, axis=0, mode="wrap"
+        )  # a ray without a hit has face -1: its normal is never used
         along = np.einsum("ij,ij->i", normal, directions)
         normal *= np.copysign(np.float32(1), -along)[:, None]
         return Hits(distance, normal, self.material[face], face)

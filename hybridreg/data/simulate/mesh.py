@@ -28,12 +28,13 @@ class Mesh:
     @staticmethod
     def of(vertices: np.ndarray, faces: np.ndarray, material: str, tint: Colour) -> Mesh:
         """One piece of one material."""
-        n = len(faces)
+        tints = np.empty((len(faces), 3), np.float32)
+        tints[:] = tint
         return Mesh(
             np.asarray(vertices, np.float32),
             np.asarray(faces, np.int32),
-            np.full(n, MATERIAL_INDEX[material], np.uint8),
-            np.broadcast_to(np.asarray(tint, np.float32), (n, 3)),
+            np.full(len(faces), MATERIAL_INDEX[material], np.uint8),
+            tints,
         )
 
     @staticmethod

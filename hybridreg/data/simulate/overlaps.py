@@ -17,8 +17,11 @@ RADIUS = 0.5  # metres; the definition that the real pairs' figures use
 
 def thin(points: np.ndarray, voxel: float) -> np.ndarray:
     """One measured point (the first) of each occupied cube of edge `voxel`, cube after cube: it compresses well."""
-    if len(points) == 0:
-        return points
+    return points[first_of_cubes(points, voxel)] if len(points) else points
+
+
+def first_of_cubes(points: np.ndarray, voxel: float) -> np.ndarray:
+    """Index (m,) of the first point in each occupied cube, cube after cube."""
     cell = np.floor(points / voxel)
     cell -= cell.min(axis=0)
     n, span = len(points), [int(s) + 1 for s in cell.max(axis=0)]
@@ -29,7 +32,7 @@ def thin(points: np.ndarray, voxel: float) -> np.ndarray:
     tagged = np.sort(((x * span[1] + y) * span[2] + z) * n + np.arange(n))
     cube = tagged // n
     first = np.flatnonzero(np.diff(cube, prepend=-1))
-    return points[tagged[first] - cube[first] * n]
+    return np.asarray(tagged[first] - cube[first] * n)
 
 
 def overlap(
@@ -58,7 +61,7 @@ def expected_overlap(
         return 0.0
     points = T_world_source[:3, 3] + hits.distance[seen, None] * directions[seen]
     # One vote per cube, like the measured figure on thinned clouds.
-    _, first = np.unique(np.floor(points / 0.5).astype(np.int64), axis=0, return_index=True)
+    first = first_of_cubes(points, 0.5)
     points, normals = points[first], hits.normal[seen][first]
     ray = points - T_world_target[:3, 3]
     distance = np.linalg.norm(ray, axis=1)

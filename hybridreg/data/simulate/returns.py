@@ -35,9 +35,7 @@ def measured_ranges(
     returned &= hit
     mixed = _mix_edges(t, returned, chance[1], chance[2])
     ranges = np.where(returned, mixed + _noise(sensor, t, cosine, hits.material) * gauss, np.float32(np.nan))
-    inside = np.flatnonzero(
-        ~returned & (hits.material == GLASS) & (chance[1] < INSIDE_SHARE) & (power > 0.3)
-    )
+    inside = np.flatnonzero(~returned & (hits.material == GLASS) & (chance[1] < INSIDE_SHARE) & (power > 0.3))
     ranges[inside] = t[inside] + 0.3 + 4.0 * chance[2][inside] ** 2
     stray = np.flatnonzero(chance[3] < STRAY_SHARE)
     ranges[stray] = sensor.range_min + 50 * chance[0][stray] ** 2

@@ -19,7 +19,7 @@ from hybridreg.data.simulate.sensors import Sensor
 def with_ground(hits: Hits, origin: np.ndarray, directions: np.ndarray, surface: Surface) -> Hits:
     """Hits on the terrain given the material that lies there."""
     ground = np.flatnonzero((hits.material == GROUND) & (hits.face >= 0))
-    xy = origin[:2].astype(np.float32) + hits.distance[ground, None] * directions[ground, :2]
+    xy = origin[:2].astype(np.float32) + hits.distance[ground, None] * directions.take(ground, axis=0)[:, :2]
     material = hits.material.copy()
     material[ground] = surface(xy[:, 0], xy[:, 1])
     return replace(hits, material=material)
@@ -35,5 +35,7 @@ def scan(
     hits = with_ground(world.cast(origin, rays), origin, rays, surface)
     ranges = measured_ranges(sensor, rays, hits, rng)
     kept = np.flatnonzero(np.isfinite(ranges))
-    steps = np.rint(directions[kept] * (ranges[kept, None] * np.float32(1 / sensor.quantum_m)))
-    return steps * np.float32(sensor.quantum_m)
+    # take() gathers rows several times as fast as indexing does, here and below.
+    points = directions.take(kept, axis=0)
+    points *= ranges.take(kept)[:, None] / np.float32(sensor.quantum_m)
+    return np.rint(points, out=points) * np.float32(sensor.quantum_m)
