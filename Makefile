@@ -24,11 +24,13 @@ lint: install
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 
-# Against the installed wheel, as a user's type checker sees it.
+# Against the installed wheel, as a user's type checker sees it: a second environment that holds the wheel alone and
+# borrows the first one's packages.
 types: install
 	rm -rf build/types && $(PYTHON) -m venv build/types
 	build/types/bin/python -m pip install --quiet --no-deps .
-	cd build && ../$(BIN)/mypy --config-file ../pyproject.toml --python-executable ../$(BIN)/python -p hybridreg
+	cd build/types/lib/python3*/site-packages && ls -d "$(CURDIR)"/.venv/lib/python3*/site-packages > borrowed.pth
+	cd build && ../$(BIN)/mypy --config-file ../pyproject.toml --python-executable types/bin/python -p hybridreg
 
 bench: install
 	$(BIN)/python -m benchmarks --data $(DATA)

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,15 +19,17 @@ _CHUNK = 1 << 16
 # The expanded square cancels terms of the size of the extent's square. Where the threshold's square is larger
 # than this share of it, float32 keeps enough digits.
 _COARSE = 50.0 * float(np.finfo(np.float32).eps)
-_MOST_REFITS = 10
+# A refit that gains less than this share moves the pose by millimetres.
+_MOST_REFITS, _LEAST_GAIN = 10, 1e-3
 
 
-class Support(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class Support:
     """A pose with the matches that agree with it."""
 
     T: Array  # (4, 4)
     inliers: Mask  # (K,)
-    count: int
+    n_inliers: int
     score: float  # the count, a match weighing less the larger its residual (MSAC, Torr and Zisserman 2000)
 
 
@@ -96,7 +98,9 @@ class Consensus:
             again = self.support(T)
             if again.score <= best.score:
                 return best
-            best = again
+            gained, best = again.score - best.score, again
+            if gained < _LEAST_GAIN * best.score:
+                return best
         return best
 
 

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,15 +16,16 @@ Indices = NDArray[np.int64]
 _ROWS = 128
 
 
-class Nearest(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class Nearest:
     """For each source descriptor, its nearest target descriptor.
 
-    index : (n,) int64, row of the target
+    row : (n,) int64, of the nearest target
     distance, second : (n,) float64, to the nearest and to the next one; infinite where there is no next
-    mutual : (n,) bool, the nearest target has no source descriptor nearer than this one, and none as near
+    mutual : (n,) bool, the nearest target has no nearer source descriptor; true once for each target at most
     """
 
-    index: Indices
+    row: Indices
     distance: Array
     second: Array
     mutual: NDArray[np.bool_]

@@ -115,7 +115,7 @@ class Ransac(Stage):
     def _search(self, consensus: Consensus, rng: np.random.Generator) -> list[Array]:
         """Poses, best first."""
         size = min(self.sample_size, len(consensus))
-        # The fit to all matches: right where there are no outliers, or where no sample is wider than the noise.
+        # The fit to all matches: right where there are no outliers, or no sample is wider than the noise.
         T, status = kabsch(consensus.source, consensus.target, consensus.weight)
         poses, counts = [T[None]], [consensus.counts(T[None])]
         if status != "ok":
@@ -150,7 +150,7 @@ class Ransac(Stage):
 
     def _optimised(self, consensus: Consensus, T: Array) -> int:
         support = consensus.support(T)
-        return consensus.refit(support).count if self.local_optimisation else support.count
+        return consensus.refit(support).n_inliers if self.local_optimisation else support.n_inliers
 
     def _wanted(self, inlier_ratio: float, size: int) -> float:
         # Samples after which one without outliers was drawn with the wanted confidence.

@@ -21,7 +21,7 @@ def ransac_open3d(
 ) -> Array | None:
     """Pose (4, 4) from matches (K, 3) to (K, 3), or None where fewer than 3 matches agree with what it found.
 
-    The clouds it gets hold the matches only, since it copies and moves the whole source for each pose it tries.
+    The clouds it gets hold the matches only, as it copies and moves the whole source for each pose it tries.
     """
     o3d = load_open3d()
     registration = o3d.pipelines.registration
@@ -45,4 +45,4 @@ def ransac_open3d(
 
 
 def _cloud(o3d: object, points: Array) -> object:
-    return o3d.geometry.PointCloud(o3d.utility.Vector3dVector(points))  # type: ignore[attr-defined]
+    return o3d.geometry.PointCloud(o3d.utility.Vector3dVector(points.copy()))  # type: ignore[attr-defined]

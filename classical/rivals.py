@@ -31,8 +31,8 @@ def modes(
     centre = np.median(consensus.source, axis=0)
     found: list[Support] = []
     left = np.argsort(-counts, kind="stable")
-    # Refitting about doubles a hypothesis's support at most, so half the share is asked for before it.
-    while len(left) and len(found) < _MOST_MODES and counts[left[0]] >= 0.5 * share * max(counts.max(), 1):
+    least = 1.0
+    while len(left) and len(found) < _MOST_MODES and counts[left[0]] >= least:
         seed = consensus.support(poses[left[0]])
         found.append(consensus.refit(seed) if refit else seed)
         near = _same(poses[left], seed.T, centre, consensus) | _same(
@@ -40,6 +40,8 @@ def modes(
         )
         near[0] = True
         left = left[~near]
+        # Refitting about doubles a hypothesis's support at most, so half the share is asked for before it.
+        least = max(least, 0.5 * share * found[-1].n_inliers)
     found.sort(key=lambda one: -one.score)
     return _distinct([one for one in found if one.score >= share * found[0].score], centre, consensus)
 

@@ -16,8 +16,6 @@ from hybridreg.stage import Stage
 
 Array = NDArray[np.float64]
 
-# A table of one byte a cell is faster than sorting as long as it stays within this many bytes.
-_TABLE = 1 << 26
 _MOST_CELLS = 2**62
 
 
@@ -78,16 +76,7 @@ def voxel_centroids(points: Array, voxel: float) -> Array:
     """
     columns = np.ascontiguousarray(points.T)  # (3, N): numpy reduces along rows ten times faster
     key, n_cells = _cell_of(columns, voxel)
-    if n_cells <= _TABLE:
-        occupied = np.zeros(n_cells, dtype=bool)
-        occupied[key] = True
-        cells = np.flatnonzero(occupied)
-        rank = np.empty(n_cells, dtype=np.int32)
-        rank[cells] = np.arange(len(cells), dtype=np.int32)
-        member, n = rank[key], len(cells)
-    else:
-        cells, member = np.unique(key, return_inverse=True)
-        n = len(cells)
+    member, n = _members(key, n_cells)
     count = np.bincount(member, minlength=n)
     sums = [np.bincount(member, weights=column, minlength=n) for column in columns]
     return np.column_stack(sums) / count[:, None]
@@ -106,6 +95,22 @@ def _cell_of(columns: Array, voxel: float) -> tuple[NDArray[np.int64], int]:
     x, y, z = ((columns - origin[:, None]) / voxel).astype(np.int64)
     nx, ny, nz = (int(s) for s in shape)
     return x + nx * (y + ny * z), nx * ny * nz
+
+
+def _members(key: NDArray[np.int64], n_cells: int) -> tuple[NDArray[np.int64], int]:
+    # Rank of each point's cell among the occupied ones, and their number.
+    bits = len(key).bit_length()
+    if n_cells >= 2 ** (63 - bits):
+        cells, member = np.unique(key, return_inverse=True)
+        return member, len(cells)
+    # Cell and row in one number, because numpy sorts numbers several times faster than it finds their order.
+    both = np.sort((key << bits) | np.arange(len(key)))
+    cell = both >> bits
+    first = np.concatenate([[True], cell[1:] != cell[:-1]])
+    rank = np.cumsum(first) - 1
+    member = np.empty(len(key), dtype=np.int64)
+    member[both & ((1 << bits) - 1)] = rank
+    return member, int(rank[-1]) + 1
 
 
 def _thin(points: Array, voxel: float, n_wanted: int) -> tuple[Array, float]:

@@ -27,7 +27,7 @@ def interval(
     if not keep.any():
         return float("nan"), float("nan")
     names, member = np.unique(np.asarray(groups)[keep], return_inverse=True)
-    sums = np.bincount(member, weights=values[keep], minlength=len(names))
+    sums = np.bincount(member, weights=values[keep], minlength=len(names)).astype(np.float64)
     counts = np.bincount(member, minlength=len(names)).astype(np.float64)
     rng = np.random.default_rng(seed)
     part = max(1, _CELLS // len(names))

@@ -59,6 +59,37 @@ def confidence(rows: Mapping[str, Sequence[Row]], protocol: Protocol) -> Figure:
     return _dressed(figure, "confidence")
 
 
+def reliability(rows: Mapping[str, Sequence[Row]], protocol: Protocol) -> Figure:
+    """Share of successes among pairs of like confidence; on the diagonal it means what it says."""
+    from plotly.graph_objects import Figure
+
+    figure = Figure()
+    for name, each in rows.items():
+        told = [row for row in each if row.confidence is not None and row.T_true is not None]
+        bins = reliability_bins(
+            np.array([row.confidence for row in told], dtype=np.float64), errors.of(told).success(protocol)
+        )
+        if told:
+            figure.add_scatter(
+                x=bins[:, 0],
+                y=100.0 * bins[:, 1],
+                mode="lines+markers",
+                name=name,
+                text=[f"{n:.0f} pairs" for n in bins[:, 2]],
+            )
+    figure.add_shape(type="line", x0=0, y0=0, x1=1, y1=100, line_dash="dot")
+    figure.update_yaxes(title="successes, %", range=[-2, 102])
+    return _dressed(figure, "confidence, in fifths")
+
+
+def reliability_bins(confidence: Array, success: NDArray[np.bool_], n_bins: int = 5) -> Array:
+    """Mean confidence, share of successes and count of each bin that is not empty, (k, 3)."""
+    member = np.minimum((confidence * n_bins).astype(int), n_bins - 1)
+    filled = [member == b for b in range(n_bins) if np.any(member == b)]
+    rows = [(confidence[m].mean(), success[m].mean(), m.sum()) for m in filled]
+    return np.array(rows, dtype=np.float64).reshape(-1, 3)
+
+
 def badness(rows: Sequence[Row], protocol: Protocol) -> Array:
     """The larger of both errors over its threshold, (n,); infinite without a pose."""
     measured = errors.of(rows)

@@ -33,10 +33,11 @@ def fine_print(table: Table) -> str:
     """What every number of a table hangs on."""
     scenes = {scene_of(row) for entry in table.entries for row in entry.rows}
     return (
-        "Recall's interval is a 95 % bootstrap over scenes (a pair and its turned copies are drawn together); one of "
-        f"no width says that all {len(scenes)} scenes agree, which leaves room for {300 / max(len(scenes), 1):.0f} "
-        "percentage points (the rule of three). A pair without a pose counts as the identity and never as a "
-        f"success. Seconds are wall time with one thread a pair; seed {table.seed}."
+        "Recall's interval is a 95 % bootstrap over scenes (a pair and its turned copies are drawn as one); "
+        f"one of no width says that all {len(scenes)} scenes agree, which still leaves room for "
+        f"{min(100.0, 300 / max(len(scenes), 1)):.0f} percentage points (the rule of three). A pair "
+        "without a pose counts as the identity and never as a success. Seconds are wall time, one thread a pair; "
+        f"seed {table.seed}."
     )
 
 

@@ -8,6 +8,7 @@ import os
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
+from hybridreg import __version__
 from hybridreg.data.dataset import fingerprint_of, ids_of
 from hybridreg.eval import truth
 from hybridreg.eval.attempt import Method, attempt, one_line
@@ -52,10 +53,11 @@ def predict(
     Raises
     ------
     ValueError
-        The file was made by another configuration; or two pairs share an id.
+        The file was made by another configuration or version; or two pairs share an id.
     """
     ids = ids_of(pairs)
     config = {
+        "version": __version__,
         "method": describe(method),
         "data": {"name": data, "pairs": len(ids), "fingerprint": fingerprint_of(pairs)},
         "seed": seed,

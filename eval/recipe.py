@@ -66,7 +66,8 @@ def read(path: str | os.PathLike[str]) -> Recipe:
     KeyError, ValueError
         Not TOML, a key that means nothing, a name that nobody registered, two lines of one name.
     """
-    shipped = os.fspath(path) in known() and not Path(path).exists()
+    # A checkout has a folder `classical` where the table of that name may be asked for.
+    shipped = os.fspath(path) in known() and not Path(path).is_file()
     file = _shipped().joinpath(f"{os.fspath(path)}.toml") if shipped else Path(path)
     try:
         table = tomllib.loads(file.read_text(encoding="utf-8"))

@@ -77,7 +77,10 @@ def _protocol_part(table: Table, protocol: Protocol) -> Iterator[str]:
         if lines:
             yield page.heading(title, 3)
             yield page.html_table(lines)
-    plots = [*figures.recall_curves(rows, protocol), figures.confidence(rows, protocol)]
+    plots = figures.recall_curves(rows, protocol)
+    judged = {name: each for name, each in rows.items() if any(row.confidence is not None for row in each)}
+    if judged:
+        plots += [figures.reliability(judged, protocol), figures.confidence(judged, protocol)]
     yield f'<div class="curves">{"".join(f"<div>{figures.to_html(plot)}</div>" for plot in plots)}</div>'
 
 

@@ -33,7 +33,9 @@ def with_voxel(downsample: Any, voxel: float | None) -> Any:
         raise ValueError(
             f"voxel={voxel} was given, but {type(downsample).__name__} has no voxel; leave one of them out"
         )
-    if downsample.voxel not in (None, voxel):
+    if downsample.voxel == voxel:
+        return downsample
+    if downsample.voxel is not None:
         raise ValueError(f"voxel={voxel} contradicts the downsampling stage's own voxel={downsample.voxel}")
     return dataclasses.replace(downsample, voxel=voxel)
 

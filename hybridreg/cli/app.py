@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import typer
 
-from hybridreg.cli import demo, doctor, evaluate, listing, register, report, table
+from hybridreg.cli import datasets, demo, doctor, evaluate, listing, register, report, table
 
 app = typer.Typer(
     name="hybridreg",
@@ -21,3 +21,4 @@ app.command("report")(report.command)
 app.command("list")(listing.command)
 app.command("doctor")(doctor.command)
 app.command("demo")(demo.command)
+app.add_typer(datasets.app, name="datasets")

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from functools import cache
 from importlib import import_module
 from importlib.metadata import entry_points
+from operator import attrgetter
 from pathlib import Path
 
 from hybridreg.pair import LabelledPair
@@ -16,7 +17,14 @@ ENTRY_POINTS = "hybridreg.datasets"
 
 # A loader takes the text after the colon and gives a sequence of labelled pairs.
 BUILT_IN = {
+    "3dcsr": "hybridreg.data.threedcsr:ThreeDCsr.from_text",
+    "3dmatch": "hybridreg.data.threedmatch:ThreeDMatch.from_text",
+    "cross-lidar": "hybridreg.data.cross_lidar:CrossLidar.from_text",
+    "cross3dreg": "hybridreg.data.cross3dreg:Cross3DReg.from_text",
     "folder": "hybridreg.data.folder:PairFolder",
+    "helipr": "hybridreg.data.helipr:HeLiPr.from_text",
+    "kitti": "hybridreg.data.kitti:Kitti.from_text",
+    "tiers": "hybridreg.data.tiers:Tiers.from_text",
 }
 
 
@@ -37,24 +45,31 @@ def open_dataset(text: str | os.PathLike[str]) -> Sequence[LabelledPair]:
 
     Parameters
     ----------
-    text : path of a folder of pairs, or "name:rest"
-        `rest` is what the loader of that name takes: a path for most, "test/near" for a simulator.
+    text : path of a folder, or "name:rest"
+        A folder is a folder of pairs or one of the layouts that `hybridreg.data.layouts` knows. `rest` is
+        what the loader of that name takes: a path for most, with options after a hash ("kitti:PATH#val").
 
     Raises
     ------
     FileNotFoundError
         Neither a folder nor a loader's name; or the loader misses its files and says where they must lie.
     """
-    name, colon, rest = os.fspath(text).partition(":")
-    if colon and name in known() and not Path(text).exists():
-        module, _, attribute = known()[name].partition(":")
-        pairs: Sequence[LabelledPair] = getattr(import_module(module), attribute)(rest)
-        return pairs
-    if not Path(text).is_dir():
+    whole = os.fspath(text)
+    name, colon, rest = whole.partition(":")
+    if colon and name in known() and not Path(whole).exists():
+        return _open(name, rest)
+    path = whole if Path(whole).exists() else whole.partition("#")[0]
+    if not Path(path).is_dir():
         raise FileNotFoundError(
-            f"{os.fspath(text)}: there is no such folder, and no loader of that name; "
+            f"{whole}: there is no such folder, and no loader of that name; "
             f"give a folder of pairs or one of {', '.join(f'{n}:...' for n in names())}"
         )
-    from hybridreg.data.folder import PairFolder
+    from hybridreg.data.layouts import layout_of
 
-    return PairFolder(text)
+    return _open(layout_of(Path(path)) or "folder", whole)
+
+
+def _open(name: str, rest: str) -> Sequence[LabelledPair]:
+    module, _, attribute = known()[name].partition(":")
+    pairs: Sequence[LabelledPair] = attrgetter(attribute)(import_module(module))(rest)
+    return pairs

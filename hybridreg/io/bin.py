@@ -52,7 +52,8 @@ def _width_by_values(data: bytes, name: str) -> int:
 
 
 def _is_ring(column: NDArray[np.float32]) -> bool:
-    return bool(np.all((column >= 0) & (column < _MOST_RINGS) & (column == np.round(column))))
+    in_range = np.all((column >= 0) & (column < _MOST_RINGS))  # NaN is not, so nothing below meets one
+    return bool(in_range and np.all(column == np.round(column)))
 
 
 def _is_intensity(column: NDArray[np.float32]) -> bool:

@@ -10,20 +10,25 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybridreg.io.faults import fault, foreign_parser
+from hybridreg.io.las_header import check_las_header
 from hybridreg.io.records import stack_axes
 
-_CHUNK = 1_000_000  # points; so that memory grows with what is there, not with what the header promises
+_CHUNK = 64 * 2**20  # bytes, so that memory grows with what a LAZ file holds, not with what it promises
 
 
 def parse_las(data: bytes, name: str) -> NDArray[np.float64]:
     """Read x, y and z of a LAS or LAZ file, scaled and offset as its header says; shape (N, 3)."""
     laspy = _laspy()
-    with foreign_parser(name, "a LAS or LAZ file"), laspy.open(io.BytesIO(data)) as reader:
-        promised = int(reader.header.point_count)
-        chunks = [stack_axes(*_axes(chunk)) for chunk in reader.chunk_iterator(_CHUNK)]
-    points = np.concatenate(chunks) if chunks else np.empty((0, 3))
-    if len(points) != promised:
-        raise fault(name, f"its header promises {promised} points, it holds {len(points)}")
+    promise = check_las_header(data, name)
+    chunk_points = max(_CHUNK // promise.point_size, 1)
+    with foreign_parser(name, "a LAS or LAZ file"):
+        # One thread: lazrs' parallel reader allocates what a damaged table of chunks says, and dies of it.
+        backends = [laspy.LazBackend.Lazrs, laspy.LazBackend.Laszip]
+        with laspy.open(io.BytesIO(data), laz_backend=backends, read_evlrs=False) as reader:
+            chunks = [stack_axes(*_axes(chunk)) for chunk in reader.chunk_iterator(chunk_points)]
+        points = np.concatenate(chunks) if chunks else np.empty((0, 3))
+    if len(points) != promise.points:
+        raise fault(name, f"its header promises {promise.points} points, it holds {len(points)}")
     return points
 
 

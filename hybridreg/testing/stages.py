@@ -107,7 +107,7 @@ def check_output(stage: Any, slot: str) -> None:
 
 def check_seed(stage: Any, slot: str) -> None:
     """The same generator gives the same bits, and nothing else is random."""
-    state = np.random.get_state()[1].copy()  # type: ignore[index, union-attr]
+    state = np.random.get_state()[1].copy()  # type: ignore[index]
     _same(_run(stage, slot), _run(stage, slot))
     assert np.array_equal(state, np.random.get_state()[1]), "numpy's global generator was used"  # type: ignore[index]
 

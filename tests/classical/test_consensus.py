@@ -50,8 +50,8 @@ def test_refit_reaches_the_matches_that_a_rough_pose_misses() -> None:
     consensus = consensus_of(matches)
     rough = consensus.support(se3.exp(np.array([0.008, -0.006, 0.007, 0.05, -0.05, 0.05])) @ T)
     refined = consensus.refit(rough)
-    assert rough.count < 0.8 * true.sum()
-    assert refined.count > 0.95 * true.sum()
+    assert rough.n_inliers < 0.8 * true.sum()
+    assert refined.n_inliers > 0.95 * true.sum()
 
 
 def test_rigid_keeps_true_samples_and_drops_repeated_matches() -> None:
@@ -83,7 +83,7 @@ def test_draw_follows_the_weights() -> None:
 
 
 def test_distances_are_measured_where_the_points_are() -> None:
-    # Turned by 3 degrees about a centre a kilometre off: the translations differ by 52 m, the points by nothing.
+    # A turn by 3 degrees about a centre a kilometre off: a translation of 52 m, and the points stay.
     centre = np.array([1000.0, 0.0, 0.0])
     turn = se3.from_rt(np.eye(3), centre) @ se3.yaw(3.0) @ se3.from_rt(np.eye(3), -centre)
     degrees, metres = distances(turn[None], np.eye(4), centre)
@@ -99,6 +99,6 @@ def test_modes_finds_two_answers_once_each() -> None:
     consensus = Consensus(source, target, np.ones(500), 0.3)
     poses = np.array([se3.exp(rng.normal(0, 0.003, 6)) @ T for T in (first, second) for _ in range(40)])
     found = modes(consensus, poses, consensus.counts(poses), refit=True, share=0.5)
-    assert [one.count for one in found] == [300, 200]
+    assert [one.n_inliers for one in found] == [300, 200]
     np.testing.assert_allclose(found[1].T, second, atol=1e-6)
     assert len(modes(consensus, poses, consensus.counts(poses), refit=True, share=0.7)) == 1

@@ -50,12 +50,12 @@ def test_keeps_the_centre_of_mass(points: np.ndarray, voxel: float) -> None:
     assert 1 <= len(centroids) <= len(points)
 
 
-@given(clouds, voxels)
-def test_both_ways_of_counting_agree(points: np.ndarray, voxel: float) -> None:
-    table = voxel_centroids(points, voxel)
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(module, "_TABLE", 0)
-        assert np.array_equal(table, voxel_centroids(points, voxel))
+@given(st.lists(st.integers(0, 50), min_size=1, max_size=200))
+def test_cells_too_many_for_the_quick_way_are_ranked_alike(cells: list[int]) -> None:
+    key = np.array(cells, dtype=np.int64)
+    quick, slow = module._members(key, 51), module._members(key, 2**62)
+    assert np.array_equal(quick[0], slow[0])
+    assert quick[1] == slow[1] == len(set(cells))
 
 
 def test_millimetre_data_does_not_depend_on_the_last_digit() -> None:

@@ -12,21 +12,31 @@ from hybridreg.eval import pictures
 ORANGE, BLUE = np.array([217, 95, 2]), np.array([59, 111, 182])
 
 
+def columns(half: np.ndarray, colour: np.ndarray) -> np.ndarray:
+    """Columns of a panel, below its legend, where many pixels have a colour."""
+    near = np.abs(half[120:-60] - colour).sum(axis=2) < 90
+    return np.flatnonzero(near.sum(axis=0) > 8)
+
+
 def test_the_picture_shows_both_clouds_before_and_after(tmp_path: Path) -> None:
     rng = np.random.default_rng(0)
-    target = np.column_stack([rng.uniform(-20, 20, 20_000), rng.uniform(-20, 20, 20_000), np.zeros(20_000)])
-    T = se3.from_rt(np.eye(3), np.array([200.0, 0.0, 0.0]))
-    pictures.before_after(tmp_path / "p.png", se3.apply(se3.inverse(T), target[:10_000]), target, T)
+    target = np.column_stack([rng.uniform(-20, 20, (40_000, 2)), np.zeros(40_000)])
+    source = target[target[:, 0] > 0] - [60.0, 0.0, 0.0]
+    pictures.before_after(
+        tmp_path / "p.png", source, target, se3.from_rt(np.eye(3), np.array([60.0, 0.0, 0.0]))
+    )
     image = cv2.imread(str(tmp_path / "p.png"))[:, :, ::-1].astype(int)
-    assert image.shape[0] > 300
-    left, right = image[:, : image.shape[1] // 2], image[:, image.shape[1] // 2 :]
-
-    def columns(half: np.ndarray, colour: np.ndarray) -> np.ndarray:
-        # Below the legend, whose dots have the same colours.
-        near = np.abs(half[80:-60] - colour).sum(axis=2) < 90
-        return np.flatnonzero(near.any(axis=0))
-
-    apart = columns(left, BLUE).mean() - columns(left, ORANGE).mean()
-    assert apart > 150
-    assert abs(columns(right, BLUE).mean() - columns(right, ORANGE).mean()) < 25
+    before, after = image[:, : image.shape[1] // 2], image[:, image.shape[1] // 2 :]
+    assert columns(before, ORANGE).max() < columns(before, BLUE).min()
+    # Aligned, the source covers the right half of the target, so blue is left where orange begins.
+    orange, blue = columns(after, ORANGE), columns(after, BLUE)
+    assert abs(orange.min() - blue.max()) < 10
+    assert abs(np.ptp(orange) - np.ptp(blue)) < 10
     assert list(tmp_path.iterdir()) == [tmp_path / "p.png"]
+
+
+def test_map_returns_far_away_do_not_shrink_the_scene() -> None:
+    near = np.random.default_rng(0).uniform(-10, 10, (1000, 3))
+    stray = np.vstack([near, [[900.0, 900.0, 0.0]]])
+    low, high = pictures._window(stray)
+    assert np.all(high - low < 30.0)

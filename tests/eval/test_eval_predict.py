@@ -147,6 +147,13 @@ def test_a_changed_configuration_is_refused_and_named(
     run(**{**first, **change})
 
 
+def test_rows_of_another_version_are_not_mixed_in(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    predict(RowByRow(), Scattered(2), tmp_path / "p.jsonl")
+    monkeypatch.setattr("hybridreg.eval.prediction.__version__", "99.0")
+    with pytest.raises(ValueError, match=r'version: ".*" before, "99\.0" now'):
+        predict(RowByRow(), Scattered(2), tmp_path / "p.jsonl")
+
+
 def test_differences_name_every_leaf() -> None:
     old, new = {"a": {"b": 1, "c": [1]}, "d": 2}, {"a": {"b": 1, "c": [2]}, "e": "x"}
     assert list(differences(old, new)) == [

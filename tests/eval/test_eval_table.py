@@ -162,6 +162,20 @@ def test_csv_holds_full_numbers(ran: tuple[Table, Path]) -> None:
     assert float(lines[1]["seconds match"]) == pytest.approx(0.1)
 
 
+def test_fine_print_counts_scenes_not_copies(ran: tuple[Table, Path]) -> None:
+    text = formats.fine_print(ran[0])
+    assert "all 3 scenes agree" in text
+    assert "100 percentage points" in text
+
+
+def test_reliability_bins_against_counting() -> None:
+    confidence = np.array([0.05, 0.1, 0.5, 0.95, 1.0, 0.9])
+    success = np.array([False, True, True, True, True, False])
+    bins = figures.reliability_bins(confidence, success)
+    assert bins == pytest.approx(np.array([[0.075, 0.5, 2], [0.5, 1.0, 1], [0.95, 2 / 3, 3]]))
+    assert figures.reliability_bins(np.zeros(0), np.zeros(0, bool)).shape == (0, 3)
+
+
 class Outline(HTMLParser):
     """What a browser would fetch, and whether tags close."""
 
@@ -202,7 +216,7 @@ def test_the_page_is_whole_and_fetches_nothing(written: Path) -> None:
 def test_the_page_holds_plotly_once_curves_and_views(written: Path) -> None:
     text = (written / "report.html").read_text()
     assert text.count("plotly.js v") == 1
-    assert text.count("Plotly.newPlot(") == 2 * 3 + 8
+    assert text.count("Plotly.newPlot(") == 2 * 4 + 8
     assert text.count(THREE_D) == 8 * 4, "each view: target, aligned, before, true"
     outside = text.replace(figures.script(), "")
     assert set(re.findall(r"https?://[^\"' ]*", outside)) <= {"https://plot.ly"}, (

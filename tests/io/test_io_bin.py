@@ -80,6 +80,13 @@ def test_missing_returns_are_kept():
     np.testing.assert_array_equal(parse_bin(table.tobytes(), "a.bin"), table[:, :3])
 
 
+@pytest.mark.filterwarnings("error")
+def test_signalling_nans_give_no_warning():
+    table = rows(60, 4)
+    table.view("<u4")[3] = 0x7FA00001
+    np.testing.assert_array_equal(parse_bin(table.tobytes(), "a.bin"), table[:, :3])
+
+
 def test_real_sweep(real_data, tmp_path):
     with np.load(real_data / "kitti-odo-5-to-0" / "source.npz") as archive:
         xyz, intensity = archive["xyz"], archive["intensity"]

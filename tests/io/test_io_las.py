@@ -47,3 +47,56 @@ def test_absurd_count(utm_cloud, compress):
     data[247:255] = (10**12).to_bytes(8, "little")  # the count of LAS 1.4
     with pytest.raises(ValueError, match=r"a\.las"):
         parse_las(bytes(data), "a.las")
+
+
+@pytest.mark.timeout(20)
+@pytest.mark.parametrize("compress", [False, True])
+def test_absurd_count_of_records_does_not_loop(utm_cloud, compress):
+    data = bytearray(las(utm_cloud, compress=compress))
+    data[100:104] = b"\xff" * 4
+    with pytest.raises(ValueError, match=r"a\.las.*4294967295 records in the \d+ bytes"):
+        parse_las(bytes(data), "a.las")
+
+
+def chunk_table(data):
+    start = int.from_bytes(data[96:100], "little")
+    return start, int.from_bytes(data[start : start + 8], "little", signed=True)
+
+
+def test_absurd_table_of_chunks_does_not_end_the_process(utm_cloud):
+    # lazrs allocates 24 bytes a chunk at once and aborts when it cannot.
+    data = bytearray(las(utm_cloud, compress=True))
+    _, place = chunk_table(data)
+    data[place + 4 : place + 8] = b"\xff" * 4
+    with pytest.raises(ValueError, match=r"a\.las.*4294967295 chunks of at least 30 bytes"):
+        parse_las(bytes(data), "a.las")
+
+
+@pytest.mark.parametrize("place", [-5, 3, 2**40])
+def test_lost_table_of_chunks(utm_cloud, place):
+    data = bytearray(las(utm_cloud, compress=True))
+    start, _ = chunk_table(data)
+    data[start : start + 8] = place.to_bytes(8, "little", signed=True)
+    with pytest.raises(ValueError, match=rf"a\.las.*table of chunks should lie at byte {place}"):
+        parse_las(bytes(data), "a.las")
+
+
+def test_table_announced_at_the_end_as_by_streaming_writers(utm_cloud):
+    data = bytearray(las(utm_cloud, compress=True, point_format=3))
+    start, place = chunk_table(data)
+    data[start : start + 8] = b"\xff" * 8
+    points = parse_las(bytes(data) + place.to_bytes(8, "little"), "a.las")
+    np.testing.assert_allclose(points, utm_cloud, rtol=0, atol=1e-8)
+
+
+def test_many_chunks():
+    points = np.round(np.random.default_rng(0).uniform(0, 100, size=(120_000, 3)), 3)
+    np.testing.assert_allclose(parse_las(las(points, scale=0.001, compress=True), "a.laz"), points, atol=1e-9)
+
+
+def test_promises_are_compared_in_numbers(utm_cloud):
+    data = las(utm_cloud)
+    with pytest.raises(ValueError, match=r"40 points of 30 bytes, it holds 1190 bytes"):
+        parse_las(data[:-10], "a.las")
+    with pytest.raises(ValueError, match="holds 100 bytes, a LAS header alone takes 227"):
+        parse_las(data[:100], "a.las")

@@ -1,0 +1,63 @@
+# SPDX-License-Identifier: MIT
+"""Multiply-adds of a forward pass, counted from the shapes that the layers really see."""
+
+from __future__ import annotations
+
+from collections import Counter
+from typing import Any
+
+import torch
+from torch import nn
+
+from hybridreg.learned import kpconv
+from hybridreg.learned.batch import Batch
+from hybridreg.learned.network import RegistrationNetwork
+from hybridreg.learned.patch_pairs import size_chunks
+from hybridreg.learned.structure_embedding import StructureEmbedding
+
+
+@torch.no_grad()
+def count_multiply_adds(network: RegistrationNetwork, batch: Batch) -> dict[str, float]:
+    """By kind of work. Square roots, sines and exponentials are not in the count."""
+    counted: Counter[str] = Counter()
+    hooks = [module.register_forward_hook(_counter(counted, module)) for module in network.modules()]
+    output = network(batch)
+    for hook in hooks:
+        hook.remove()
+    chunks = size_chunks(
+        network.pair_up(output.encoding, output.superpoints.target, output.superpoints.source)
+    )
+    cells = sum(len(c) * (c.target_mask.shape[1] + 1) * (c.source_mask.shape[1] + 1) for c in chunks)
+    counted["point scores"] = cells * network.config.backbone.fine_dim
+    counted["Sinkhorn"] = cells * 2 * network.transport.iterations
+    return dict(counted)
+
+
+def _counter(counted: Counter[str], module: nn.Module) -> Any:
+    def linear(_: nn.Module, args: tuple[Any, ...], out: torch.Tensor) -> None:
+        assert isinstance(module, nn.Linear)
+        counted["linear layers"] += out.numel() * module.in_features
+
+    def convolution(_: nn.Module, args: tuple[Any, ...], out: torch.Tensor) -> None:
+        assert isinstance(module, kpconv.KPConv)
+        _, queries, supports, neighbors = args[:4]
+        influence = args[4] or kpconv.kernel_influence(
+            queries, supports, neighbors, module.kernel, module.sigma
+        )
+        n_kernel, dim_in, dim_out = module.weights.shape
+        counted["KPConv, gathering"] += len(influence.index) * dim_in
+        counted["KPConv, products"] += len(queries) * n_kernel * dim_in * dim_out
+        counted["KPConv, influences"] += neighbors.numel() * n_kernel * 3
+
+    def image(_: nn.Module, args: tuple[Any, ...], out: torch.Tensor) -> None:
+        assert isinstance(module, nn.Conv2d)
+        counted["image"] += out.numel() * module.in_channels * module.kernel_size[0] * module.kernel_size[1]
+
+    def structure(_: nn.Module, args: tuple[Any, ...], out: torch.Tensor) -> None:
+        assert isinstance(module, StructureEmbedding)
+        # one product for the distance of each pair and one for each of its angles
+        products = 1 + min(module.angle_k, out.shape[0] - 1)
+        counted["structure embedding"] += out.numel() * module.distance.in_features * products
+
+    by_kind = {StructureEmbedding: structure, nn.Linear: linear, kpconv.KPConv: convolution, nn.Conv2d: image}
+    return by_kind.get(type(module), lambda *_: None)  # type: ignore[call-overload]

@@ -1,0 +1,35 @@
+# SPDX-License-Identifier: MIT
+"""Two different LiDARs and a camera over one procedural scene, with exact ground truth.
+
+>>> from hybridreg.data import simulate
+>>> labelled = next(simulate.pairs(tier="mid", seed=1))
+"""
+
+from hybridreg.data.simulate.drawn import Drawn, draw
+from hybridreg.data.simulate.folder import read_pair, write_pair, write_pairs
+from hybridreg.data.simulate.labelled import pair, pairs, to_labelled
+from hybridreg.data.simulate.overlaps import overlap
+from hybridreg.data.simulate.scenes import SCENES
+from hybridreg.data.simulate.sensors import SENSORS, Sensor
+from hybridreg.data.simulate.splits import SPLITS, VERSION, pair_number
+from hybridreg.data.simulate.tiers import TIERS, Tier
+
+__all__ = [
+    "SCENES",
+    "SENSORS",
+    "SPLITS",
+    "TIERS",
+    "VERSION",
+    "Drawn",
+    "Sensor",
+    "Tier",
+    "draw",
+    "overlap",
+    "pair",
+    "pair_number",
+    "pairs",
+    "read_pair",
+    "to_labelled",
+    "write_pair",
+    "write_pairs",
+]

@@ -1,0 +1,65 @@
+# SPDX-License-Identifier: MIT
+"""Triangles with a material and a tint: what every simulated thing is made of."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hybridreg.data.simulate.materials import MATERIAL_INDEX
+
+Tint = tuple[float, float, float]
+Colour = Sequence[float] | NDArray[Any]  # red, green, blue in [0,1]
+
+
+@dataclass(frozen=True)
+class Mesh:
+    """vertices (V,3) float32 in metres, faces (F,3) int32, material (F,) uint8, tint (F,3) float32 in [0,1]."""
+
+    vertices: NDArray[np.float32]
+    faces: NDArray[np.int32]
+    material: NDArray[np.uint8]
+    tint: NDArray[np.float32]
+
+    @staticmethod
+    def of(vertices: np.ndarray, faces: np.ndarray, material: str, tint: Colour) -> Mesh:
+        """One piece of one material."""
+        n = len(faces)
+        return Mesh(
+            np.asarray(vertices, np.float32),
+            np.asarray(faces, np.int32),
+            np.full(n, MATERIAL_INDEX[material], np.uint8),
+            np.broadcast_to(np.asarray(tint, np.float32), (n, 3)),
+        )
+
+    @staticmethod
+    def merge(parts: Iterable[Mesh]) -> Mesh:
+        """All parts as one mesh; no parts give an empty mesh."""
+        pieces = [part for part in parts if len(part.faces)]
+        if not pieces:
+            return EMPTY
+        starts = np.cumsum([0] + [len(p.vertices) for p in pieces[:-1]])
+        return Mesh(
+            np.concatenate([p.vertices for p in pieces]),
+            np.concatenate([p.faces + np.int32(s) for p, s in zip(pieces, starts, strict=True)]),
+            np.concatenate([p.material for p in pieces]),
+            np.concatenate([p.tint for p in pieces]),
+        )
+
+    def moved(self, yaw: float, offset: Sequence[float]) -> Mesh:
+        """Turned by `yaw` radians about z, then shifted by `offset` (3,)."""
+        c, s = np.cos(yaw), np.sin(yaw)
+        turn = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
+        return replace(self, vertices=(self.vertices @ turn.T + np.asarray(offset)).astype(np.float32))
+
+
+EMPTY = Mesh(
+    np.zeros((0, 3), np.float32),
+    np.zeros((0, 3), np.int32),
+    np.zeros(0, np.uint8),
+    np.zeros((0, 3), np.float32),
+)

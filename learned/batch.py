@@ -1,0 +1,64 @@
+# SPDX-License-Identifier: MIT
+"""What a network takes: the pyramid of a pair, input features, and the image where there is one. No truth."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+import torch
+from torch import Tensor
+
+from hybridreg.learned.config import NetworkConfig
+from hybridreg.learned.image_input import image_tensor
+from hybridreg.learned.input_features import input_features
+from hybridreg.learned.pyramid import Pyramid, build_pyramid
+
+
+@dataclass(frozen=True, kw_only=True)
+class Batch:
+    """One pair, ready for a network."""
+
+    pyramid: Pyramid
+    features: Tensor  # (N_1, C_in) float32, target first
+    image: Tensor | None = None  # (3, H, W) float32, normalised
+
+    def to(self, device: torch.device | str) -> Batch:
+        """The same batch on another device."""
+        image = None if self.image is None else self.image.to(device)
+        return Batch(pyramid=self.pyramid.to(device), features=self.features.to(device), image=image)
+
+
+def make_batch(
+    target: npt.NDArray[np.floating],
+    source: npt.NDArray[np.floating],
+    config: NetworkConfig,
+    *,
+    image: npt.NDArray[np.uint8] | None = None,
+    subsample: bool = True,
+    device: torch.device | str = "cpu",
+) -> Batch:
+    """Build the pyramid and the input features of a pair.
+
+    Parameters
+    ----------
+    target, source
+        (M, 3), (N, 3) metres, each in its sensor's frame.
+    config
+        Of the network that will take the batch.
+    image
+        (H, W, 3) uint8, or None; left aside by a network that has no image encoder.
+    subsample
+        False when both clouds already are on the first stage's grid.
+    device
+        Where the neighbours are searched and the tensors end up.
+    """
+    clouds = [torch.from_numpy(np.array(c, dtype=np.float32)).to(device) for c in (target, source)]
+    pyramid = build_pyramid(clouds[0], clouds[1], config.backbone, subsample=subsample)
+    tensor = None
+    if image is not None and config.image is not None:
+        tensor = image_tensor(image, config.image.height, config.image.width).to(device)
+    return Batch(
+        pyramid=pyramid, features=input_features(pyramid, config.backbone.input_features), image=tensor
+    )

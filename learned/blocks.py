@@ -1,0 +1,142 @@
+# SPDX-License-Identifier: MIT
+"""The blocks of KPConv-FPN: normalisation, unary layers, convolution and residual blocks (methods 3.3)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from torch import Tensor, nn
+from torch.nn import functional as F
+
+from hybridreg.learned.kpconv import Influence, KPConv
+from hybridreg.learned.max_pool import max_pool
+
+_SLOPE = 0.1
+_EPS = 1e-5
+
+
+@dataclass(frozen=True)
+class Surroundings:
+    """What a block needs to know of the geometry: where it computes, from where, and through which links."""
+
+    queries: Tensor  # (N, 3)
+    supports: Tensor  # (M, 3)
+    neighbors: Tensor  # (N, k) into the supports, pad M
+    lengths: tuple[int, int]  # queries of the target, of the source
+    support_lengths: tuple[int, int]
+    influence: Influence | None = None
+
+
+class PointGroupNorm(nn.Module):
+    """Group normalisation of (N, C) features over all points, or over each cloud apart."""
+
+    def __init__(self, dim: int, groups: int, per_cloud: bool) -> None:
+        super().__init__()
+        self.groups, self.per_cloud = groups, per_cloud
+        self.weight = nn.Parameter(torch.ones(dim))
+        self.bias = nn.Parameter(torch.zeros(dim))
+
+    def forward(self, features: Tensor, lengths: tuple[int, int]) -> Tensor:
+        """(N, C) to (N, C); ``lengths`` splits the rows into target and source."""
+        if not self.per_cloud:
+            return self._normalize(features)
+        return torch.cat([self._normalize(cloud) for cloud in features.split(list(lengths))])
+
+    def _normalize(self, features: Tensor) -> Tensor:
+        # By channel first, then over the channels of a group: the rows stay where they are, while
+        # torch's group_norm would want them transposed and back.
+        mean = features.mean(0)
+        variance = (features - mean).square().mean(0)
+        grouped = mean.view(self.groups, -1)
+        group_mean = grouped.mean(1, keepdim=True)
+        group_variance = (variance.view(self.groups, -1) + (grouped - group_mean).square()).mean(
+            1, keepdim=True
+        )
+        scale = (group_variance + _EPS).rsqrt().expand_as(grouped).flatten() * self.weight
+        shift = self.bias - group_mean.expand_as(grouped).flatten() * scale
+        return torch.addcmul(shift, features, scale)
+
+
+class Unary(nn.Module):
+    """Linear, then group normalisation, then LeakyReLU unless ``activate`` is false."""
+
+    def __init__(
+        self, dim_in: int, dim_out: int, groups: int, per_cloud: bool, *, activate: bool = True
+    ) -> None:
+        super().__init__()
+        self.activate = activate
+        self.linear = nn.Linear(dim_in, dim_out)
+        self.norm = PointGroupNorm(dim_out, groups, per_cloud)
+
+    def forward(self, features: Tensor, lengths: tuple[int, int]) -> Tensor:
+        """(N, C_in) to (N, C_out)."""
+        features = self.norm(self.linear(features), lengths)
+        return F.leaky_relu_(features, _SLOPE) if self.activate else features
+
+
+@dataclass(frozen=True, kw_only=True)
+class BlockPlan:
+    """One block of the encoder."""
+
+    dim_in: int
+    dim_out: int
+    radius: float
+    sigma: float
+    groups: int
+    per_cloud: bool
+    n_kernel: int
+    strided: bool = False
+
+
+class ConvBlock(nn.Module):
+    """KPConv, group normalisation, LeakyReLU."""
+
+    def __init__(self, plan: BlockPlan, rng: np.random.Generator | None) -> None:
+        super().__init__()
+        self.conv = KPConv(plan.dim_in, plan.dim_out, plan.radius, plan.sigma, plan.n_kernel, rng)
+        self.norm = PointGroupNorm(plan.dim_out, plan.groups, plan.per_cloud)
+
+    def forward(self, features: Tensor, around: Surroundings) -> Tensor:
+        """(M, C_in) to (N, C_out)."""
+        features = self.conv(features, around.queries, around.supports, around.neighbors, around.influence)
+        return F.leaky_relu_(self.norm(features, around.lengths), _SLOPE)
+
+
+class ResidualBlock(nn.Module):
+    """Bottleneck of unary, KPConv and unary, beside a shortcut, max-pooled where the block is strided."""
+
+    def __init__(self, plan: BlockPlan, rng: np.random.Generator | None) -> None:
+        super().__init__()
+        groups, per_cloud = plan.groups, plan.per_cloud
+        middle = plan.dim_out // 4
+        self.strided = plan.strided
+        self.unary_in = Unary(plan.dim_in, middle, groups, per_cloud) if plan.dim_in != middle else None
+        self.conv = KPConv(middle, middle, plan.radius, plan.sigma, plan.n_kernel, rng)
+        self.norm = PointGroupNorm(middle, groups, per_cloud)
+        self.unary_out = Unary(middle, plan.dim_out, groups, per_cloud, activate=False)
+        widens = plan.dim_in != plan.dim_out
+        self.unary_shortcut = (
+            Unary(plan.dim_in, plan.dim_out, groups, per_cloud, activate=False) if widens else None
+        )
+
+    def forward(self, features: Tensor, around: Surroundings) -> Tensor:
+        """(M, C_in) to (N, C_out)."""
+        main = features if self.unary_in is None else self.unary_in(features, around.support_lengths)
+        main = self.conv(main, around.queries, around.supports, around.neighbors, around.influence)
+        main = self.unary_out(F.leaky_relu_(self.norm(main, around.lengths), _SLOPE), around.lengths)
+        shortcut = max_pool(features, around.neighbors) if self.strided else features
+        if self.unary_shortcut is not None:
+            shortcut = self.unary_shortcut(shortcut, around.lengths)
+        return F.leaky_relu_(main + shortcut, _SLOPE)
+
+
+def upsample(features: Tensor, nearest: Tensor) -> Tensor:
+    """Each point takes the features of its coarse point, (M, C) and (N,) to (N, C); a shadow gives 0."""
+    return F.embedding(nearest, pad_row(features))
+
+
+def pad_row(features: Tensor) -> Tensor:
+    """Append a row of zeros: what the shadow index points at."""
+    return torch.cat([features, features.new_zeros(1, features.shape[1])])

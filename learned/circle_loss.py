@@ -1,0 +1,58 @@
+# SPDX-License-Identifier: MIT
+"""The coarse loss: circle loss on superpoint features, weighted by overlap (methods 10)."""
+
+from __future__ import annotations
+
+import torch
+from torch import Tensor
+from torch.nn import functional as F
+
+from hybridreg.learned.config import LossConfig
+from hybridreg.learned.distances import squared_distances
+
+
+def circle_loss(target: Tensor, source: Tensor, overlap: Tensor, config: LossConfig) -> Tensor:
+    """Overlap-weighted circle loss.
+
+    Parameters
+    ----------
+    target, source
+        (m, c), (n, c) features of length one.
+    overlap
+        (m, n) in [0, 1]; above ``positive_overlap`` a pair is positive, at 0 negative, between ignored.
+
+    Returns
+    -------
+    Tensor
+        Scalar. Where no row or no column has both a positive and a negative, that half is 0 and keeps the
+        graph.
+    """
+    # 1e-12 keeps the gradient of the root finite where two features agree.
+    distance = (squared_distances(target, source, unit=True) + 1e-12).sqrt()
+    positive, negative = overlap > config.positive_overlap, overlap == 0
+    pull, push = _exponents(distance, positive, negative, overlap, config)
+    rows = positive.any(1) & negative.any(1)
+    columns = positive.any(0) & negative.any(0)
+    by_row = _side(pull, push, 1, rows, config.log_scale)
+    by_column = _side(pull, push, 0, columns, config.log_scale)
+    return (by_row + by_column) / 2
+
+
+def _exponents(
+    distance: Tensor, positive: Tensor, negative: Tensor, overlap: Tensor, config: LossConfig
+) -> tuple[Tensor, Tensor]:
+    # Entries that are neither get weight 0, hence exponent 0: a constant in the sum, as in the published
+    # loss.
+    fixed = distance.detach()
+    pull_weight = (fixed - config.positive_optimal).clamp_min(0.0) * overlap.sqrt() * positive
+    push_weight = (config.negative_optimal - fixed).clamp_min(0.0) * negative
+    pull = config.log_scale * (distance - config.positive_margin) * pull_weight
+    push = config.log_scale * (config.negative_margin - distance) * push_weight
+    return pull, push
+
+
+def _side(pull: Tensor, push: Tensor, dim: int, valid: Tensor, scale: float) -> Tensor:
+    if not bool(valid.any()):
+        return pull.sum() * 0.0
+    exponent = torch.logsumexp(pull, dim) + torch.logsumexp(push, dim)
+    return (F.softplus(exponent) / scale)[valid].mean()

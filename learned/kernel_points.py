@@ -1,0 +1,61 @@
+# SPDX-License-Identifier: MIT
+"""Where the kernel points of a KPConv lie: spread in the unit ball by repulsion (methods 3.1)."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+import numpy.typing as npt
+
+_MEAN_RADIUS = 0.66
+_STEPS = 600
+
+
+@lru_cache(maxsize=8)
+def _disposition(n_points: int) -> npt.NDArray[np.float64]:
+    """(n_points, 3): the first at the centre, the others pushed apart by 1/d and held together by 10 r^2."""
+    rng = np.random.default_rng(0)
+    points = rng.normal(size=(n_points, 3)) * 0.3
+    points[0] = 0.0
+    for step in range(_STEPS):
+        rate = 0.01 * 0.995**step
+        move = np.clip(-_gradient(points) * rate, -0.05, 0.05)
+        points[1:] += move[1:]
+    radius = np.linalg.norm(points[1:], axis=1).mean()
+    return points * (_MEAN_RADIUS / radius)
+
+
+def _gradient(points: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    difference = points[:, None] - points[None]
+    distance = np.linalg.norm(difference, axis=-1) + np.eye(len(points))
+    return 20.0 * points - (difference / distance[..., None] ** 3).sum(1)
+
+
+def kernel_points(
+    n_points: int, radius: float, rng: np.random.Generator | None = None
+) -> npt.NDArray[np.float32]:
+    """Kernel points of one layer.
+
+    Parameters
+    ----------
+    n_points
+        15 in every published network.
+    radius
+        Search radius of the layer in metres.
+    rng
+        Turns the disposition about z and shakes it by a normal of 0.01 radii, as the reference does for each
+        layer; ``None`` keeps it still, so that the layers of a stage can share it.
+
+    Returns
+    -------
+    ndarray
+        (n_points, 3) float32, metres.
+    """
+    points = _disposition(n_points)
+    if rng is not None:
+        angle = rng.uniform(0.0, 2 * np.pi)
+        cos, sin = np.cos(angle), np.sin(angle)
+        turned = points @ np.array([[cos, sin, 0.0], [-sin, cos, 0.0], [0.0, 0.0, 1.0]])
+        points = turned + rng.normal(scale=0.01, size=points.shape)
+    return (points * radius).astype(np.float32)

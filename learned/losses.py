@@ -1,0 +1,81 @@
+# SPDX-License-Identifier: MIT
+"""The three losses together (methods 10)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor
+
+from hybridreg.learned.circle_loss import circle_loss
+from hybridreg.learned.config import LossConfig
+from hybridreg.learned.fine_loss import assignment_loss
+from hybridreg.learned.mask_loss import focal_loss
+from hybridreg.learned.network import Encoding
+from hybridreg.learned.omp import OverlapLogits
+from hybridreg.learned.patch_pairs import PatchPairs
+from hybridreg.learned.superpoint_mask import Kept
+from hybridreg.learned.targets import Targets
+
+
+@dataclass(frozen=True)
+class Losses:
+    """The parts of the training loss; the paper adds them with weights of one."""
+
+    coarse: Tensor
+    fine: Tensor
+    mask: Tensor
+
+    @property
+    def total(self) -> Tensor:
+        """Plain sum."""
+        return self.coarse + self.fine + self.mask
+
+
+def overlap_matrix(targets: Targets, kept: tuple[Kept, Kept]) -> Tensor:
+    """(m, n) true overlaps among the kept superpoints; pairs with a masked superpoint are dropped."""
+    full = targets.overlap.new_zeros(len(targets.mask_target), len(targets.mask_source))
+    full[targets.target, targets.source] = targets.overlap
+    return full[kept[0].index][:, kept[1].index]
+
+
+def mask_loss(overlap: OverlapLogits | None, targets: Targets, config: LossConfig) -> Tensor:
+    """Mean of both clouds' focal losses; 0 without OMP."""
+    if overlap is None:
+        return targets.overlap.new_zeros(())
+    sides = ((overlap.target, targets.mask_target), (overlap.source, targets.mask_source))
+    losses = [
+        focal_loss(
+            logits,
+            truth,
+            alpha=config.focal_alpha,
+            gamma=config.focal_gamma,
+            alpha_mode=config.focal_alpha_mode,
+        )
+        for logits, truth in sides
+    ]
+    return torch.stack(losses).mean()
+
+
+def compute_losses(
+    encoding: Encoding,
+    overlap: OverlapLogits | None,
+    kept: tuple[Kept, Kept],
+    features: tuple[Tensor, Tensor],
+    pairs: PatchPairs,
+    assignment: Tensor,
+    targets: Targets,
+    config: LossConfig,
+) -> Losses:
+    """All losses of a step: features (m, c), (n, c) of kept superpoints, assignments of patch pairs."""
+    fine = assignment_loss(
+        assignment,
+        pairs,
+        encoding.target.points,
+        encoding.source.points,
+        targets.transform,
+        config.positive_radius,
+    )
+    coarse = circle_loss(*features, overlap_matrix(targets, kept), config)
+    return Losses(coarse, fine, mask_loss(overlap, targets, config))

@@ -1,0 +1,214 @@
+# SPDX-License-Identifier: MIT
+"""The whole network: GeoTransformer, and with OMP and VGAM switched on, Cross3DReg."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import torch
+from torch import Tensor, nn
+from torch.nn import functional as F
+
+from hybridreg.learned.backbone import KpconvFpn
+from hybridreg.learned.batch import Batch
+from hybridreg.learned.blocks import pad_row
+from hybridreg.learned.config import NetworkConfig
+from hybridreg.learned.geotransformer import GeoTransformerBlock
+from hybridreg.learned.image_encoder import ImageEncoder, ImageFeatures
+from hybridreg.learned.omp import OverlapLogits, OverlapPredictor
+from hybridreg.learned.patch_pairs import PatchPairs, pair_patches, size_chunks
+from hybridreg.learned.patches import Patches, build_patches
+from hybridreg.learned.point_matching import PointMatches, gather_matches
+from hybridreg.learned.pyramid import Pyramid
+from hybridreg.learned.sinkhorn import OptimalTransport
+from hybridreg.learned.superpoint_mask import Kept, cap, keep_all, keep_predicted
+from hybridreg.learned.superpoint_matching import SuperpointMatches, match_superpoints
+from hybridreg.learned.vgam import VisualGeometricAttention
+
+
+@dataclass(frozen=True, kw_only=True)
+class CloudEncoding:
+    """One cloud after the encoders."""
+
+    nodes: Tensor  # (n, 3) superpoints, metres
+    node_features: Tensor  # (n, C)
+    points: Tensor  # (N, 3) fine points, metres
+    point_features: Tensor  # (N, d)
+    patches: Patches
+
+
+@dataclass(frozen=True, kw_only=True)
+class Encoding:
+    """A pair after the encoders: what all later parts share."""
+
+    target: CloudEncoding
+    source: CloudEncoding
+    image: ImageFeatures | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Output:
+    """What a forward pass gives."""
+
+    encoding: Encoding
+    overlap: OverlapLogits | None
+    kept: tuple[Kept, Kept]  # target, source
+    node_features: tuple[Tensor, Tensor]  # unit length, of the kept superpoints
+    superpoints: SuperpointMatches  # indices into all superpoints
+    matches: PointMatches
+
+
+class RegistrationNetwork(nn.Module):
+    """Features, overlap, superpoint and point matches of a pair. No part of it takes a ground truth.
+
+    Parameters
+    ----------
+    config
+        The network; ``named_config`` has the published ones.
+    seed
+        Fixes how the kernel points of unshared layers are turned. The weights follow torch's generator.
+    """
+
+    def __init__(self, config: NetworkConfig, seed: int = 0) -> None:
+        super().__init__()
+        self.config = config
+        hidden = config.transformer.hidden_dim
+        self.backbone = KpconvFpn(config.backbone, seed)
+        self.in_proj = nn.Linear(config.backbone.coarse_dim, hidden)
+        self.transformer = GeoTransformerBlock(config.transformer)
+        self.transport = OptimalTransport(config.matching.sinkhorn_iterations)
+        image = config.image
+        self.image_encoder = None if image is None else ImageEncoder(image)
+        self.omp: OverlapPredictor | None = None
+        self.vgam: VisualGeometricAttention | None = None
+        if image is not None and config.omp is not None:
+            self.omp = OverlapPredictor(config.omp, config.backbone.coarse_dim, image.dim)
+        if image is not None and config.vgam is not None:
+            self.vgam = VisualGeometricAttention(config.vgam, hidden, image.dim)
+
+    def forward(self, batch: Batch) -> Output:
+        """Match a pair: encode, predict the overlap, attend, match superpoints, match points."""
+        encoding = self.encode(batch)
+        overlap = self.predict_overlap(encoding)
+        kept = self.keep(encoding, overlap)
+        features = self.attend(encoding, kept)
+        superpoints = self.match_superpoints(encoding, kept, features)
+        matches = self.match_points(encoding, superpoints)
+        return Output(
+            encoding=encoding,
+            overlap=overlap,
+            kept=kept,
+            node_features=features,
+            superpoints=superpoints,
+            matches=matches,
+        )
+
+    def encode(self, batch: Batch) -> Encoding:
+        """Run the encoders and group fine points into patches."""
+        pyramid = batch.pyramid
+        coarse, fine = self.backbone(batch.features, pyramid)
+        nodes = coarse.split(list(pyramid.lengths[-1]))
+        points = fine.split(list(pyramid.lengths[self.config.backbone.fine_stage - 1]))
+        return Encoding(
+            target=self._cloud(pyramid, 0, nodes[0], points[0]),
+            source=self._cloud(pyramid, 1, nodes[1], points[1]),
+            image=None if self.image_encoder is None else self.image_encoder(batch.image),
+        )
+
+    def _cloud(
+        self, pyramid: Pyramid, cloud: int, node_features: Tensor, point_features: Tensor
+    ) -> CloudEncoding:
+        nodes = pyramid.clouds(pyramid.stages - 1)[cloud]
+        points = pyramid.clouds(self.config.backbone.fine_stage - 1)[cloud]
+        return CloudEncoding(
+            nodes=nodes,
+            node_features=node_features,
+            points=points,
+            point_features=point_features,
+            patches=build_patches(points, nodes, self.config.matching.patch_points),
+        )
+
+    def predict_overlap(self, encoding: Encoding) -> OverlapLogits | None:
+        """Overlap logits of all superpoints; None without OMP."""
+        if self.omp is None or encoding.image is None:
+            return None
+        return self.omp(encoding.target.node_features, encoding.source.node_features, encoding.image)
+
+    def keep(self, encoding: Encoding, overlap: OverlapLogits | None) -> tuple[Kept, Kept]:
+        """Choose the superpoints of both clouds that go on. An uninformed mask keeps everything."""
+        target = self._keep(
+            encoding.target, None if overlap is None or not overlap.informed else overlap.target
+        )
+        source = self._keep(
+            encoding.source, None if overlap is None or not overlap.informed else overlap.source
+        )
+        return target, source
+
+    def _keep(self, cloud: CloudEncoding, logits: Tensor | None) -> Kept:
+        limit = self.config.matching.max_superpoints
+        if logits is None or self.config.omp is None:
+            sizes = torch.bincount(cloud.patches.owner, minlength=len(cloud.nodes))
+            return cap(keep_all(cloud.patches), sizes, limit)
+        probability = torch.sigmoid(logits.detach())
+        return cap(keep_predicted(probability, cloud.patches, self.config.omp), probability, limit)
+
+    def attend(self, encoding: Encoding, kept: tuple[Kept, Kept]) -> tuple[Tensor, Tensor]:
+        """Unit features (m, d), (n, d) of the kept superpoints after VGAM and the GeoTransformer block."""
+        features, points = [], []
+        for cloud, keep in zip((encoding.target, encoding.source), kept, strict=True):
+            at = cloud.nodes[keep.index]
+            projected = self.in_proj(cloud.node_features[keep.index])
+            if self.vgam is not None and encoding.image is not None:
+                projected = self.vgam(projected, at, encoding.image)
+            features.append(projected)
+            points.append(at)
+        target, source = self.transformer(features[0], features[1], points[0], points[1])
+        return F.normalize(target, dim=1), F.normalize(source, dim=1)
+
+    def match_superpoints(
+        self, encoding: Encoding, kept: tuple[Kept, Kept], features: tuple[Tensor, Tensor]
+    ) -> SuperpointMatches:
+        """Pairs of kept superpoints that own fine points, best first, as indices into all superpoints."""
+        target = _owning(encoding.target.patches, kept[0])
+        source = _owning(encoding.source.patches, kept[1])
+        config = self.config.matching
+        found = match_superpoints(
+            features[0][target],
+            features[1][source],
+            config.superpoint_matches,
+            dual=config.dual_normalization,
+            temperature=config.temperature,
+        )
+        target_index, source_index = kept[0].index[target][found.target], kept[1].index[source][found.source]
+        return SuperpointMatches(target_index, source_index, found.score)
+
+    def pair_up(self, encoding: Encoding, target_nodes: Tensor, source_nodes: Tensor) -> PatchPairs:
+        """The patches of superpoints (B,), (B,) side by side."""
+        return pair_patches(encoding.target.patches, encoding.source.patches, target_nodes, source_nodes)
+
+    def assign(
+        self,
+        encoding: Encoding,
+        pairs: PatchPairs,
+        form: Literal["log", "kernel"] = "log",
+        iterations: int | None = None,
+    ) -> Tensor:
+        """Log-assignments (B, n + 1, m + 1) of patch pairs, the last row and column the slack."""
+        target = F.embedding(pairs.target_index, pad_row(encoding.target.point_features))
+        source = F.embedding(pairs.source_index, pad_row(encoding.source.point_features))
+        dim = target.shape[2]
+        scale = dim**0.5 if self.config.matching.score_scale == "sqrt" else float(dim)
+        scores = torch.bmm(target, source.transpose(1, 2)) / scale
+        return self.transport(scores, pairs.target_mask, pairs.source_mask, form, iterations)
+
+    def match_points(self, encoding: Encoding, superpoints: SuperpointMatches) -> PointMatches:
+        """Point correspondences of the matched superpoints' patches."""
+        config = self.config.matching
+        chunks = size_chunks(self.pair_up(encoding, superpoints.target, superpoints.source))
+        blocks = [(chunk, self.assign(encoding, chunk, config.sinkhorn_form)) for chunk in chunks]
+        return gather_matches(blocks, encoding.target.points, encoding.source.points, config)
+
+
+def _owning(patches: Patches, kept: Kept) -> Tensor:
+    return patches.occupied[kept.index].nonzero()[:, 0]

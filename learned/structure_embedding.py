@@ -1,0 +1,67 @@
+# SPDX-License-Identifier: MIT
+"""GeoTransformer's geometric structure embedding: distances and angles between superpoints (methods 6.6)."""
+
+from __future__ import annotations
+
+import math
+
+import torch
+from torch import Tensor, nn
+from torch.nn import functional as F
+
+from hybridreg.learned.distances import squared_distances
+from hybridreg.learned.positions import frequencies
+
+# Values of the (rows, n, k, d) angle tensor computed in one go: 16 MB, whatever the number of superpoints.
+_CHUNK_VALUES = 2**22
+
+
+class StructureEmbedding(nn.Module):
+    """One vector for each ordered pair of superpoints, unchanged by rigid motion.
+
+    ``sigma_d`` in metres and ``sigma_a`` in degrees scale distance and angle; ``angle_k`` nearest superpoints
+    span the angles.
+    """
+
+    frequency: Tensor
+
+    def __init__(self, dim: int, sigma_d: float, sigma_a: float, angle_k: int) -> None:
+        super().__init__()
+        self.sigma_d, self.angle_k = sigma_d, angle_k
+        self.angle_scale = 180.0 / (sigma_a * math.pi)
+        self.register_buffer("frequency", frequencies(dim))
+        self.distance, self.angle = nn.Linear(dim, dim), nn.Linear(dim, dim)
+
+    def forward(self, points: Tensor) -> Tensor:
+        """(n, 3) metres to (n, n, d)."""
+        distance = squared_distances(points, points).sqrt()  # (n, n)
+        k = min(self.angle_k, len(points) - 1)
+        nearest = distance.topk(k + 1, largest=False)[1][:, 1:]  # (n, k)
+        rows = max(1, _CHUNK_VALUES // (len(points) * max(k, 1) * self.distance.in_features))
+        blocks = torch.arange(len(points), device=points.device).split(rows)
+        return torch.cat([self._rows(points, distance[block], nearest[block], block) for block in blocks])
+
+    def _rows(self, points: Tensor, distance: Tensor, nearest: Tensor, block: Tensor) -> Tensor:
+        embedding = self._embed(self.distance, distance / self.sigma_d)  # (b, n, d)
+        if nearest.shape[1] == 0:  # a single superpoint spans no angle
+            return embedding
+        angles = neighbor_angles(points[block], points, points[nearest]) * self.angle_scale  # (b, n, k)
+        return embedding.add_(self._embed(self.angle, angles).amax(2))
+
+    def _embed(self, layer: nn.Linear, values: Tensor) -> Tensor:
+        # The layer's columns are sorted to take all sines, then all cosines, instead of interleaving the
+        # values.
+        half = len(self.frequency)
+        weight = layer.weight.view(-1, half, 2).transpose(1, 2).reshape(-1, 2 * half)
+        omega = values[..., None] * self.frequency
+        return F.linear(torch.cat([omega.sin(), omega.cos()], dim=-1), weight, layer.bias)
+
+
+def neighbor_angles(anchors: Tensor, points: Tensor, nearest: Tensor) -> Tensor:
+    """Angles (b, n, k) in radians at anchors (b, 3), between points (n, 3) and neighbours (b, k, 3)."""
+    to_point = (points[None] - anchors[:, None])[:, :, None]  # (b, n, 1, 3)
+    to_near = (nearest - anchors[:, None])[:, None]  # (b, 1, k, 3)
+    shape = torch.broadcast_shapes(to_point.shape, to_near.shape)
+    to_point, to_near = to_point.expand(shape), to_near.expand(shape)
+    sine = torch.linalg.cross(to_near, to_point, dim=-1).norm(dim=-1)
+    return torch.atan2(sine, (to_near * to_point).sum(-1))

@@ -1,0 +1,34 @@
+# SPDX-License-Identifier: MIT
+from __future__ import annotations
+
+import importlib.util
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hybridreg.data.simulate import TIERS, VERSION
+
+_spec = importlib.util.spec_from_file_location("freeze", Path(__file__).with_name("freeze.py"))
+assert _spec is not None
+assert _spec.loader is not None
+freeze = importlib.util.module_from_spec(_spec)
+_spec.loader.exec_module(freeze)
+STORED = json.loads(freeze.FROZEN.read_text())
+
+
+def test_version_is_the_frozen_one() -> None:
+    assert STORED["version"] == VERSION
+    assert set(STORED["first"]) == set(TIERS)
+
+
+@pytest.mark.parametrize("tier", TIERS)
+def test_the_test_split_has_not_changed(tier: str) -> None:
+    stored, now = STORED["first"][tier], freeze.fingerprint(tier)
+    advice = "the simulator's output changed: raise splits.VERSION and run tests/data/simulate/freeze.py"
+    assert (now["scene"], now["sensors"]) == (stored["scene"], stored["sensors"]), advice
+    np.testing.assert_allclose(now["T_target_source"], stored["T_target_source"], atol=1e-6, err_msg=advice)
+    assert now["overlap"] == pytest.approx(stored["overlap"], abs=0.003), advice
+    np.testing.assert_allclose(now["points"], stored["points"], rtol=0.002, err_msg=advice)
+    np.testing.assert_allclose(now["centroids"], stored["centroids"], atol=0.02, err_msg=advice)

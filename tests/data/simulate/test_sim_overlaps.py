@@ -1,0 +1,38 @@
+# SPDX-License-Identifier: MIT
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from hybridreg import se3
+from hybridreg.data.simulate.overlaps import overlap, thin
+
+
+@given(st.integers(0, 10_000), st.floats(0.05, 2.0))
+def test_thin_keeps_one_measured_point_of_each_cube(seed: int, voxel: float) -> None:
+    points = np.random.default_rng(seed).normal(0, 3, (300, 3)).astype(np.float32)
+    kept = thin(points, voxel)
+    cells = {tuple(c) for c in np.floor(points / voxel).astype(int)}
+    assert {tuple(c) for c in np.floor(kept / voxel).astype(int)} == cells
+    assert len(kept) == len(cells)
+    assert {p.tobytes() for p in kept} <= {p.tobytes() for p in points}
+
+
+@given(st.integers(0, 10_000))
+def test_overlap_is_the_share_within_reach_under_the_transform(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    target = rng.uniform(-5, 5, (200, 3))
+    T = se3.from_rt(se3.random_rotation(rng), rng.normal(0, 5, 3))
+    source = se3.apply(se3.inverse(T), target)
+    far = rng.random(200) < 0.3
+    source[far] += 100
+    brute = (np.linalg.norm(se3.apply(T, source)[:, None] - target[None], axis=2).min(1) <= 0.5).mean()
+    assert overlap(source, target, T) == pytest.approx(brute)
+    assert overlap(source[far], target, T) == 0.0
+
+
+def test_empty_clouds_share_nothing() -> None:
+    assert overlap(np.zeros((0, 3)), np.zeros((5, 3)), np.eye(4)) == 0.0
+    assert overlap(np.zeros((5, 3)), np.zeros((0, 3)), np.eye(4)) == 0.0

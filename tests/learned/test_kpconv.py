@@ -1,0 +1,118 @@
+# SPDX-License-Identifier: MIT
+"""KPConv against a triple loop (C3), its blocks, and max-pooling."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import torch
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from hybridreg.learned import kpconv
+from hybridreg.learned.blocks import PointGroupNorm, upsample
+from hybridreg.learned.kernel_points import kernel_points
+from hybridreg.learned.kpconv import kernel_influence, kernel_point_convolution
+from hybridreg.learned.max_pool import max_pool
+
+
+def by_loops(queries, supports, neighbors, kernel, sigma, features, weights, bias):  # type: ignore[no-untyped-def]
+    """The definition, entry by entry."""
+    out = torch.zeros(len(queries), weights.shape[2], dtype=torch.float64)
+    for i, query in enumerate(queries):
+        valid = [j for j in neighbors[i].tolist() if j < len(supports)]
+        for k, point in enumerate(kernel):
+            summed = torch.zeros(weights.shape[1], dtype=torch.float64)
+            for j in valid:
+                h = 1.0 - float((supports[j] - query - point).norm()) / sigma
+                summed += max(0.0, h) * features[j]
+            out[i] += summed @ weights[k]
+        out[i] /= max(1, sum(float(features[j].sum()) > 0 for j in valid))
+    return out + bias
+
+
+@pytest.mark.parametrize("chunk", [7, 2**18])
+def test_equals_a_triple_loop(monkeypatch: pytest.MonkeyPatch, chunk: int) -> None:
+    monkeypatch.setattr(kpconv, "_CHUNK_ENTRIES", chunk * 15 * 6)
+    gen = torch.Generator().manual_seed(0)
+    supports = torch.rand(20, 3, dtype=torch.float64, generator=gen)
+    queries = torch.rand(11, 3, dtype=torch.float64, generator=gen)
+    neighbors = torch.randint(0, 21, (11, 6), generator=gen)  # 20 is the shadow
+    neighbors[3] = 20
+    features = torch.randn(20, 4, dtype=torch.float64, generator=gen)  # about half have a negative sum
+    weights = torch.randn(15, 4, 5, dtype=torch.float64, generator=gen)
+    bias = torch.randn(5, dtype=torch.float64, generator=gen)
+    kernel = torch.from_numpy(kernel_points(15, 0.8)).double()
+    influence = kernel_influence(queries, supports, neighbors, kernel, 0.4)
+    got = kernel_point_convolution(features, neighbors, influence, weights, bias)
+    want = by_loops(queries, supports, neighbors, kernel, 0.4, features, weights, bias)
+    assert torch.allclose(got, want, atol=1e-10, rtol=0)
+    assert torch.equal(got[3], bias)
+
+
+def test_gradients_reach_features_and_weights() -> None:
+    gen = torch.Generator().manual_seed(1)
+    points = torch.rand(9, 3, dtype=torch.float64, generator=gen)
+    neighbors = torch.randint(0, 10, (9, 4), generator=gen)
+    features = torch.rand(9, 3, dtype=torch.float64, generator=gen, requires_grad=True)
+    weights = torch.randn(15, 3, 2, dtype=torch.float64, generator=gen, requires_grad=True)
+    influence = kernel_influence(
+        points, points, neighbors, torch.from_numpy(kernel_points(15, 0.8)).double(), 0.5
+    )
+
+    def convolve(f: torch.Tensor, w: torch.Tensor) -> torch.Tensor:
+        return kernel_point_convolution(f, neighbors, influence, w, None)
+
+    assert torch.autograd.gradcheck(convolve, (features, weights))
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.integers(1, 12), st.integers(1, 5), st.integers(1, 4), st.integers(0, 10**6))
+def test_max_pool_equals_gathering(n: int, slots: int, width: int, seed: int) -> None:
+    gen = torch.Generator().manual_seed(seed)
+    features = torch.randint(-2, 3, (n, width), generator=gen).double().requires_grad_()  # many ties
+    neighbors = torch.randint(0, n + 1, (n, slots), generator=gen)
+    padded = torch.cat([features, features.new_zeros(1, width)])
+    got, want = max_pool(features, neighbors), padded[neighbors].amax(1)
+    assert torch.equal(got, want)
+    upstream = torch.rand(got.shape, dtype=torch.float64, generator=gen)
+    assert torch.allclose(
+        torch.autograd.grad(got, features, upstream)[0], torch.autograd.grad(want, features, upstream)[0]
+    )
+
+
+@pytest.mark.parametrize("n", [1, 2, 50])
+def test_group_norm_equals_torch(n: int) -> None:
+    norm = PointGroupNorm(12, 4, per_cloud=False)
+    torch.nn.init.normal_(norm.weight)
+    torch.nn.init.normal_(norm.bias)
+    features = torch.randn(n, 12) * 3 + 100
+    want = torch.nn.functional.group_norm(features.t()[None], 4, norm.weight, norm.bias)[0].t()
+    got = norm(features, (n, 0))
+    assert got.shape == (n, 12)
+    assert torch.allclose(got, want, atol=2e-4)
+
+
+def test_per_cloud_norm_ignores_the_other_cloud() -> None:
+    mine, other = torch.randn(30, 8), torch.randn(20, 8) * 9
+    stacked, apart = PointGroupNorm(8, 2, per_cloud=False), PointGroupNorm(8, 2, per_cloud=True)
+    first, second = torch.cat([mine, other]), torch.cat([mine, other + 50])
+    assert torch.equal(apart(first, (30, 20))[:30], apart(second, (30, 20))[:30])
+    assert not torch.allclose(stacked(first, (30, 20))[:30], stacked(second, (30, 20))[:30])
+
+
+def test_upsampling_a_shadow_gives_zeros() -> None:
+    got = upsample(torch.ones(3, 2), torch.tensor([0, 3, 2]))
+    assert got.tolist() == [[1, 1], [0, 0], [1, 1]]
+
+
+def test_kernel_points_are_spread() -> None:
+    points = kernel_points(15, 2.0).astype(np.float64)
+    radius = np.linalg.norm(points, axis=1)
+    apart = np.linalg.norm(points[:, None] - points[None], axis=-1) + 9 * np.eye(15)
+    assert radius[0] == 0
+    assert radius[1:].mean() == pytest.approx(1.32, abs=1e-5)
+    assert apart.min() > 0.8
+    turned = kernel_points(15, 2.0, np.random.default_rng(3))
+    assert not np.allclose(points, turned, atol=0.1)
+    assert np.array_equal(turned, kernel_points(15, 2.0, np.random.default_rng(3)))
