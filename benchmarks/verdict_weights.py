@@ -201,8 +201,8 @@ def report(name: str, p: Array, right: NDArray[np.bool_], world: NDArray[np.int6
     for kind, here in (every, *kinds):
         good, bad = p[right & here], p[~right & here]
         print(
-            f"  {kind:9s} of {len(good):3d} right poses {np.mean(good >= 0.95):4.0%} ok, {np.mean(good < 0.5):4.0%} failed; "
-            f"of {len(bad):3d} wrong ones {np.sum(bad >= 0.95):2d} ok, {np.mean(bad < 0.5):4.0%} failed"
+            f"  {kind:9s} of {len(good):3d} right poses {np.mean(good >= 0.95):4.0%} ok, {np.mean(good < 0.5):4.0%} "
+            f"failed; of {len(bad):3d} wrong ones {np.sum(bad >= 0.95):2d} ok, {np.mean(bad < 0.5):4.0%} failed"
         )
 
 

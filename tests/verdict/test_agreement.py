@@ -5,9 +5,9 @@ import dataclasses
 
 import numpy as np
 import pytest
-from conftest import Made
 from hypothesis import given
 from hypothesis import strategies as st
+from made_places import Made
 
 from hybridreg import se3
 from hybridreg.verdict import views

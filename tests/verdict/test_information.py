@@ -3,7 +3,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from conftest import Made
+from made_places import Made
 
 from hybridreg import se3
 from hybridreg.verdict import information, views

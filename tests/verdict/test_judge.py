@@ -4,7 +4,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import worlds
-from conftest import Made, make
+from made_places import Made, make
 
 from hybridreg import se3
 from hybridreg.classical.voxel import VoxelGrid
