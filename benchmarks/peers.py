@@ -56,7 +56,9 @@ def open3d_then_gicp(voxel: float) -> Method:
         reg = o3d.pipelines.registration
         clouds, features = [], []
         for cloud in (labelled.pair.source, labelled.pair.target):
-            down = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(cloud.points)).voxel_down_sample(voxel)
+            down = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(cloud.points.copy())).voxel_down_sample(
+                voxel
+            )
             down.estimate_normals(o3d.geometry.KDTreeSearchParamHybrid(2 * voxel, 30))
             clouds.append(down)
             features.append(
@@ -111,10 +113,22 @@ class Outcome:
         return self.rre_deg < 2.0 and self.rte_m < 0.5
 
 
-def race(pairs: Iterable[LabelledPair], methods: dict[str, Method]) -> Iterator[Outcome]:
-    """Run every method on a pair before the next pair, so that a slow minute of the machine hits all alike."""
+def read(rows: Path | None) -> list[Outcome]:
+    """What an earlier run wrote; nothing where it wrote nothing."""
+    if rows is None or not rows.exists():
+        return []
+    return [Outcome(**json.loads(line)) for line in rows.read_text().splitlines()]
+
+
+def race(
+    pairs: Iterable[LabelledPair], methods: dict[str, Method], done: Iterable[Outcome] = ()
+) -> Iterator[Outcome]:
+    """Run every method on a pair before the next, so that a slow minute of the machine hits all alike."""
+    known = {(outcome.method, outcome.pair) for outcome in done}
     for labelled in pairs:
         for name, method in methods.items():
+            if (name, labelled.pair.id) in known:
+                continue
             start = time.perf_counter()
             T = method(labelled)
             seconds = time.perf_counter() - start
@@ -142,6 +156,16 @@ def summary(outcomes: list[Outcome], against: str) -> str:
     return "\n".join(lines)
 
 
+def report(outcomes: list[Outcome], data: str, starts: int) -> str:
+    """The summary with a caption that says what was run."""
+    n = len({o.pair for o in outcomes})
+    caption = (
+        f"{n} runs: the pairs in `{data}` as they are and under {starts} random yaw starts. "
+        "Success is 2 deg and 0.5 m; seconds are medians of one run on one machine."
+    )
+    return f"{caption}\n\n{summary(outcomes, 'kiss-matcher 0.5 + small_gicp')}\n"
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
@@ -149,22 +173,23 @@ def main() -> None:
     parser.add_argument("--data", default="../shared/data/real")
     parser.add_argument("--starts", type=int, default=3, help="random yaw starts beside the pair as it is")
     parser.add_argument("--presets", nargs="*", default=["kiss-gicp", "fpfh-ransac-gicp"])
-    parser.add_argument("--rows", type=Path, help="write one JSON line for each method and pair")
+    parser.add_argument("--rows", type=Path, help="one JSON line for each method and pair; resumes from it")
+    parser.add_argument("--table", type=Path, help="write the summary as Markdown")
     options = parser.parse_args()
     methods = {name: make() for name, make in PEERS.items()} | {
         name: preset(name) for name in options.presets
     }
-    outcomes = []
-    for outcome in race(yaw_starts(open_dataset(options.data), options.starts), methods):
+    outcomes = read(options.rows)
+    for outcome in race(yaw_starts(open_dataset(options.data), options.starts), methods, outcomes):
         outcomes.append(outcome)
-        print(f"{outcome.pair:40s} {outcome.method:38s} {outcome.rre_deg:7.2f} {outcome.rte_m:7.2f} "
-              f"{'ok' if outcome.success else '--'} {outcome.seconds:.2f} s", flush=True)  # fmt: skip
-    print(
-        f"\n{len(outcomes) // len(methods)} starts of the pairs in {options.data}; success is 2 deg and 0.5 m\n"
-    )
-    print(summary(outcomes, "kiss-matcher 0.5 + small_gicp"))
-    if options.rows:
-        options.rows.write_text("".join(json.dumps(dataclasses.asdict(o)) + "\n" for o in outcomes))
+        print(outcome, flush=True)
+        if options.rows:
+            with options.rows.open("a") as rows:
+                rows.write(json.dumps(dataclasses.asdict(outcome)) + "\n")
+    text = report(outcomes, options.data, options.starts)
+    print(f"\n{text}")
+    if options.table:
+        options.table.write_text(text)
 
 
 if __name__ == "__main__":

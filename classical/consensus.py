@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,7 +23,8 @@ _COARSE = 50.0 * float(np.finfo(np.float32).eps)
 _MOST_REFITS, _LEAST_GAIN = 10, 1e-3
 
 
-class Support(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class Support:
     """A pose with the matches that agree with it."""
 
     T: Array  # (4, 4)

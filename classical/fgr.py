@@ -77,8 +77,8 @@ class Fgr(Stage):
         o3d.utility.random.seed(seed)
         rows = np.arange(len(source), dtype=np.int32)
         result = o3d.pipelines.registration.registration_fgr_based_on_correspondence(
-            o3d.geometry.PointCloud(o3d.utility.Vector3dVector(source)),
-            o3d.geometry.PointCloud(o3d.utility.Vector3dVector(target)),
+            o3d.geometry.PointCloud(o3d.utility.Vector3dVector(source.copy())),
+            o3d.geometry.PointCloud(o3d.utility.Vector3dVector(target.copy())),
             o3d.utility.Vector2iVector(np.column_stack([rows, rows])),
             o3d.pipelines.registration.FastGlobalRegistrationOption(
                 division_factor=self.division_factor,

@@ -60,7 +60,7 @@ class Fpfh(Stage):
     mutual: bool = True
     ratio: float | None = None
     min_overlap: float = 0.5
-    max_points: int = 20_000
+    max_points: int = 50_000
 
     gives: ClassVar[frozenset[str]] = frozenset({"matches"})
 

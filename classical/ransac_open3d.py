@@ -45,4 +45,4 @@ def ransac_open3d(
 
 
 def _cloud(o3d: object, points: Array) -> object:
-    return o3d.geometry.PointCloud(o3d.utility.Vector3dVector(points))  # type: ignore[attr-defined]
+    return o3d.geometry.PointCloud(o3d.utility.Vector3dVector(points.copy()))  # type: ignore[attr-defined]

@@ -44,7 +44,7 @@ def estimate(points: Array, viewpoint: Array | None, k: int = 20) -> Surface:
     _, index = cKDTree(points).query(points, k=k, workers=n_threads())
     neighbours = points[index.reshape(len(points), k)]
     centred = neighbours - neighbours.mean(axis=1, keepdims=True)
-    values, vectors = np.linalg.eigh(np.einsum("nki,nkj->nij", centred, centred) / k)
+    values, vectors = np.linalg.eigh(np.swapaxes(centred, 1, 2) @ centred / k)
     normals = vectors[:, :, 0]
     towards = np.array([0.0, 0.0, 1.0]) if viewpoint is None else viewpoint - points
     away = np.sum(normals * towards, axis=1) < 0.0

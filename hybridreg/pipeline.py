@@ -157,6 +157,9 @@ class Pipeline(Stage):
         with stopwatch(seconds, "downsample"):
             scene = self.downsample(pair)
         fitting.check_scene(scene)
+        for name, cloud in (("source", pair.source), ("target", pair.target)):
+            if cloud.dropped:
+                scene.note(f"{cloud.dropped} points of the {name} were not finite and were dropped")
         with stopwatch(seconds, "overlap"):
             overlap = self.overlap(scene)
         with stopwatch(seconds, "match"):

@@ -75,9 +75,10 @@ class RangeImage:
             raise ValueError("range image: every point lies at the viewpoint")
         reach = reach[apart]
         directions = ray[apart] / reach[:, None]
+        directions, reach = _thin(directions, reach, _FINEST)
         resolution = angular_resolution(directions)
-        kept = _thin(directions, reach, max(0.5 * resolution, _FINEST))
-        directions, reach = directions[kept], reach[kept]
+        if resolution > 2.0 * _FINEST:
+            directions, reach = _thin(directions, reach, 0.5 * resolution)
         tree = cKDTree(directions, balanced_tree=False, compact_nodes=False)
         return cls(np.asarray(viewpoint, dtype=np.float64), directions, reach, resolution, tree)
 
@@ -147,7 +148,7 @@ def _merged(cells: Integers) -> Integers:
     return ((x >> 1) << 2 * _BITS) | ((y >> 1) << _BITS) | (z >> 1)
 
 
-def _thin(directions: Array, ranges: Array, angle: float) -> Integers:
+def _thin(directions: Array, ranges: Array, angle: float) -> tuple[Array, Array]:
     # One number to sort by: the cell, then the range in steps of a 16-millionth.
     steps = (ranges * ((2.0**24 - 1) / ranges.max())).astype(np.int64)
     cell = _cells(directions, angle)
@@ -156,7 +157,8 @@ def _thin(directions: Array, ranges: Array, angle: float) -> Integers:
     near = order[np.concatenate([[0], change + 1])]
     far = order[np.concatenate([change, [len(order) - 1]])]
     # The farthest return too where it lies on another surface: a cell on an edge must tell of both.
-    return np.concatenate([near, far[ranges[far] > (1.0 + _ONE_SURFACE) * ranges[near]]])
+    kept = np.concatenate([near, far[ranges[far] > (1.0 + _ONE_SURFACE) * ranges[near]]])
+    return directions[kept], ranges[kept]
 
 
 def _slope(rays: Array, normals: Array | None) -> Array:

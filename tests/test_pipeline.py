@@ -2,6 +2,7 @@
 from __future__ import annotations
 
 import dataclasses
+import json
 import pickle
 from dataclasses import dataclass
 from pathlib import Path
@@ -255,3 +256,40 @@ def test_presets_build_pickle_and_clone(name: str) -> None:
     assert sklearn.clone(pipe) == pipe
     assert pipe.get_params()["downsample__voxel"] == 0.5
     assert pipe.replace(refine__iterations=3).refine.iterations == 3 if "gicp" in name else True
+
+
+def test_dropped_points_stand_in_the_result(courtyard: tuple[hr.Pair, np.ndarray]) -> None:
+    source = courtyard[0].source.points.copy()
+    source[5:8, 1] = np.nan
+    result = hr.register(source, courtyard[0].target.points, preset="icp", voxel=0.5, nonfinite="drop")
+    assert "3 points of the source were not finite and were dropped" in result.notes
+    with pytest.raises(ValueError, match="source: 3 of"):
+        hr.register(source, courtyard[0].target.points, preset="icp", voxel=0.5)
+
+
+def test_register_takes_any_mix(courtyard: tuple[hr.Pair, np.ndarray], tmp_path: Path) -> None:
+    torch = pytest.importorskip("torch")
+    pair = courtyard[0]
+    np.save(tmp_path / "source.npy", pair.source.points)
+    expected = hr.register(pair.source.points, pair.target.points, preset="icp", voxel=0.5).transformation
+    for source in (
+        tmp_path / "source.npy",
+        str(tmp_path / "source.npy"),
+        pair.source,
+        pair.source.points.tolist(),
+    ):
+        result = hr.register(source, torch.tensor(pair.target.points), preset="icp", voxel=0.5)
+        assert np.array_equal(result.transformation, expected)
+
+
+def test_result_is_written_whole(courtyard: tuple[hr.Pair, np.ndarray], tmp_path: Path) -> None:
+    result = hr.register(courtyard[0].source, courtyard[0].target, preset="icp", voxel=0.5)
+    result.save(tmp_path / "result.json")
+    result.save(tmp_path / "T.txt")
+    assert np.array_equal(np.loadtxt(tmp_path / "T.txt"), result.transformation)
+    stored = json.loads((tmp_path / "result.json").read_text())
+    assert stored["transformation"] == result.transformation.tolist()
+    assert stored["n_correspondences"] == len(result.correspondence_set)
+    assert stored["spec"]["refine"]["stage"] == "icp"
+    with pytest.raises(ValueError, match=r"\.json \(everything\) or \.txt"):
+        result.save(tmp_path / "result.pkl")

@@ -24,6 +24,7 @@ BUILT_IN = {
     "folder": "hybridreg.data.folder:PairFolder",
     "helipr": "hybridreg.data.helipr:HeLiPr.from_text",
     "kitti": "hybridreg.data.kitti:Kitti.from_text",
+    "sim": "hybridreg.data.simulated:Simulated",
     "tiers": "hybridreg.data.tiers:Tiers.from_text",
 }
 

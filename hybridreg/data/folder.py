@@ -79,6 +79,9 @@ def load_pair(folder: Path) -> LabelledPair:
 
 
 def _is_pair(folder: Path) -> bool:
+    # A hidden folder is one that was being written when its process was killed.
+    if folder.name.startswith("."):
+        return False
     return folder.is_dir() and ((folder / "meta.json").is_file() or any(folder.glob("source.*")))
 
 

@@ -77,13 +77,14 @@ def _turned(
     # Half a turn through the centre of the overlap about the axis that most surfaces face (the vertical, where there
     # is ground); and about each axis so that the middles of both clouds meet, which is where a room repeats.
     axes, centre = agreement.axes, information.centre
-    about = [
-        se3.from_rt(half, centre - half @ centre) @ T
-        for half in (se3.rotation_about(np.pi * axis) for axis in axes)
-    ]
     middle = _middle(target.points, axes)
-    met = [se3.from_rt(np.eye(3), middle - _middle(se3.apply(G, source.points), axes)) @ G for G in about]
-    return [about[0], *met]
+    guesses = []
+    for axis in axes:
+        half = se3.rotation_about(np.pi * axis)
+        about = se3.from_rt(half, centre - half @ centre) @ T
+        gap = middle - _middle(se3.apply(about, source.points), axes)
+        guesses += [about, se3.from_rt(np.eye(3), gap - axis * (gap @ axis)) @ about]
+    return [guesses[0], *guesses[1::2]]
 
 
 def _middle(points: Array, axes: Array) -> Array:

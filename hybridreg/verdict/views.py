@@ -58,8 +58,12 @@ def views(scene: Scene) -> tuple[View, View]:
 
 def spacing(scene: Scene) -> float:
     """Resolution of the evidence, metres."""
-    pair = scene.pair
-    return scene.shared(("verdict", "spacing"), lambda: default_voxel(pair.source.points, pair.target.points))
+    # A share of a large cloud reaches as far as the whole.
+    clouds = [
+        cloud.points[:: max(1, len(cloud) // _MOST_POINTS)]
+        for cloud in (scene.pair.source, scene.pair.target)
+    ]
+    return scene.shared(("verdict", "spacing"), lambda: default_voxel(*clouds))
 
 
 def _view(scene: Scene, side: Side) -> View:

@@ -1,7 +1,11 @@
 # SPDX-License-Identifier: MIT
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -17,6 +21,7 @@ from hybridreg.scene import Scene
 from hybridreg.testing import check_stage
 
 pytestmark = needs_open3d
+ROOT = Path(__file__).resolve().parents[2]
 
 TURN = se3.from_rt(se3.yaw(120.0)[:3, :3], np.array([1.0, -2.0, 0.3]))
 
@@ -126,3 +131,27 @@ def test_features_are_computed_once_a_run(turned: Scene) -> None:
 def test_bad_settings(fields: dict[str, float], message: str) -> None:
     with pytest.raises(ValueError, match=message):
         Fpfh(**fields)  # type: ignore[arg-type]
+
+
+SCRIPT = """
+import hashlib, sys
+sys.path.insert(0, {root!r})
+from hybridreg import Fpfh, testing
+from hybridreg.matches import Overlap
+scene = testing.sample_scene()[0]
+matches = Fpfh(ratio=0.99)(scene, Overlap.full(len(scene.source), len(scene.target)))
+assert len(matches) > 100
+print(hashlib.sha256(matches.source_index.tobytes() + matches.target_index.tobytes()).hexdigest())
+"""
+
+
+def test_the_same_matches_for_any_number_of_threads() -> None:
+    digests = set()
+    for threads in ("1", "2"):
+        env = {**os.environ, "OMP_NUM_THREADS": threads, "OPENBLAS_NUM_THREADS": threads}
+        script = SCRIPT.format(root=str(ROOT))
+        run = subprocess.run(
+            [sys.executable, "-c", script], env=env, capture_output=True, text=True, check=True
+        )
+        digests.add(run.stdout.strip())
+    assert len(digests) == 1

@@ -104,7 +104,9 @@ def test_numbers_however_written(value: Any, number: int) -> None:
     assert records.number({"seq": value}, records.SEQUENCE, "pair") == number
 
 
-@pytest.mark.parametrize("value", ["", "a", None, [8], {}, -1, 8.5, 1.5e300, float("nan"), float("inf"), "9" * 40])
+@pytest.mark.parametrize(
+    "value", ["", "a", None, [8], {}, -1, 8.5, 1.5e300, float("nan"), float("inf"), "9" * 40]
+)
 def test_numbers_that_are_none(value: Any) -> None:
     with pytest.raises(ValueError, match="pair"):
         records.number({"seq": value}, records.SEQUENCE, "pair")

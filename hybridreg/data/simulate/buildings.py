@@ -13,8 +13,8 @@ from hybridreg.data.simulate.solids import boxes, loft, quads
 # One window cell on 12 corners: 0-3 the cell, 4-7 the hole in the wall, 8-11 the pane behind it.
 _WALL = [[0, 1, 5], [0, 5, 4], [1, 2, 6], [1, 6, 5], [2, 3, 7], [2, 7, 6], [3, 0, 4], [3, 4, 7]]
 _REVEAL = [[4, 5, 9], [4, 9, 8], [5, 6, 10], [5, 10, 9], [6, 7, 11], [6, 11, 10], [7, 4, 8], [7, 8, 11]]
-_PANE = np.array([[8, 9, 10], [8, 10, 11]])
-_STONE = np.array(_WALL + _REVEAL)
+_PANE = np.array([[8, 9, 10], [8, 10, 11]], np.int32)
+_STONE = np.array(_WALL + _REVEAL, np.int32)
 _WALL_TINTS = (
     (0.72, 0.68, 0.60), (0.80, 0.74, 0.58), (0.62, 0.36, 0.28), (0.55, 0.30, 0.24), (0.75, 0.75, 0.73),
     (0.58, 0.58, 0.60), (0.83, 0.80, 0.74), (0.70, 0.55, 0.42), (0.66, 0.70, 0.72),
@@ -90,20 +90,20 @@ def facade(
     u0, u1, z0, z1, w0, w1, s0, s1 = _cells(style, length, height, rng)
 
     def corners(a: np.ndarray, b: np.ndarray, c: np.ndarray, d: np.ndarray, depth: float) -> np.ndarray:
-        u, z = np.stack([a, b, b, a], 1), np.stack([c, c, d, d], 1)
-        xy = start + u[..., None] * along - depth * out
-        return np.concatenate([xy, (base + z)[..., None]], -1)  # (n,4,3)
+        u, z = np.stack([a, b, b, a]), np.stack([c, c, d, d])
+        x, y = start - depth * out
+        return np.stack([x + along[0] * u, y + along[1] * u, base + z])  # (3,4,n)
 
     points = np.concatenate(
         [corners(u0, u1, z0, z1, 0), corners(w0, w1, s0, s1, 0), corners(w0, w1, s0, s1, style.recess)], 1
     )
-    stride = (np.arange(len(u0)) * 12)[:, None, None]
-    vertices = points.reshape(-1, 3)
+    stride = np.arange(0, 12 * len(u0), 12, dtype=np.int32)[:, None, None]
+    vertices = points.T.reshape(-1, 3).astype(np.float32)
     pane_tint = np.array([0.25, 0.29, 0.33]) * rng.uniform(0.6, 1.3)
     parts = [
-        Mesh.of(vertices, (_STONE[None] + stride).reshape(-1, 3), style.material, style.tint),
+        Mesh.of(vertices, (_STONE + stride).reshape(-1, 3), style.material, style.tint),
         # Curtains and blinds: a third of the windows answer like plaster, the others like glass.
-        *_panes(vertices, (_PANE[None] + stride), pane_tint, rng),
+        *_panes(vertices, (_PANE + stride), pane_tint, rng),
     ]
     parts += _relief(start, along, out, base, length, height, style, (w0, w1, s0), rng)
     return parts

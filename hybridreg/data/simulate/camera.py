@@ -12,11 +12,15 @@ from scipy.spatial.transform import Rotation
 from hybridreg.data.simulate.caster import Hits, World
 from hybridreg.data.simulate.layout import Surface
 from hybridreg.data.simulate.light import Light
-from hybridreg.data.simulate.materials import GLOSS
+from hybridreg.data.simulate.materials import COLOUR, GLOSS, GROUND
 from hybridreg.data.simulate.scan import with_ground
 from hybridreg.data.simulate.texture import shade_factor
 
 WIDTH, HEIGHT = 512, 288
+# Cameras measure one colour per pixel and guess the others: their pictures resolve about half of their pixels.
+# So do these, which are drawn at the smaller size and enlarged.
+ACROSS, UP = 384, 216
+SHADOWS = np.float32(300)  # metres over which things cast them
 
 
 @dataclass(frozen=True)
@@ -37,14 +41,17 @@ class Camera:
         return Camera(T, rng.uniform(62, 96), rng.normal(0, 0.04))
 
     def rays(self, rng: np.random.Generator) -> np.ndarray:
-        """Unit directions (H*W,3) in the world, one at a random spot of each pixel."""
-        spot = rng.random((2, HEIGHT, WIDTH), dtype=np.float32)
-        u = (np.arange(WIDTH) + spot[0] - WIDTH / 2) / (WIDTH / 2)
-        v = (np.arange(HEIGHT)[:, None] + spot[1] - HEIGHT / 2) / (WIDTH / 2)
-        bulge = (1 + self.distortion * (u**2 + v**2)) * np.tan(np.radians(self.fov_deg) / 2)
+        """Unit directions (UP*ACROSS,3) float32 in the world, one at a random spot of each pixel."""
+        u, v = rng.random((2, UP, ACROSS), dtype=np.float32)
+        u += np.arange(-ACROSS / 2, ACROSS / 2, dtype=np.float32)
+        v += np.arange(-UP / 2, UP / 2, dtype=np.float32)[:, None]
+        u, v = u / np.float32(ACROSS / 2), v / np.float32(ACROSS / 2)
+        bulge = (1 + np.float32(self.distortion) * (u * u + v * v)) * np.float32(
+            np.tan(np.radians(self.fov_deg) / 2)
+        )
         d = np.stack([np.ones_like(u), -u * bulge, -v * bulge], -1).reshape(-1, 3)
-        d /= np.linalg.norm(d, axis=1, keepdims=True)
-        return (d @ self.T_world_camera[:3, :3].T).astype(np.float32)
+        d /= np.sqrt(np.einsum("ij,ij->i", d, d))[:, None]
+        return d @ self.T_world_camera[:3, :3].T.astype(np.float32)
 
 
 def photograph(
@@ -52,35 +59,39 @@ def photograph(
 ) -> NDArray[np.uint8]:
     """RGB picture (288,512,3) uint8 with sun, sky, haze, texture, vignette and noise."""
     rays = camera.rays(rng)
-    origin = camera.T_world_camera[:3, 3]
-    hits = world.cast(origin, rays)
-    hits = with_ground(hits, origin, rays, surface)
+    origin = camera.T_world_camera[:3, 3].astype(np.float32)
+    hits = with_ground(world.cast(origin, rays), origin, rays, surface)
     colour = np.empty_like(rays)
-    solid, open_sky = (np.flatnonzero(m) for m in (np.isfinite(hits.distance), np.isinf(hits.distance)))
-    colour[open_sky] = light.sky(rays[open_sky])
-    colour[solid] = _surfaces(world, origin, rays[solid], _rows(hits, solid), light)
-    return _develop(colour.reshape(HEIGHT, WIDTH, 3), light, rng)
+    solid, open_sky = np.flatnonzero(hits.face >= 0), np.flatnonzero(hits.face < 0)
+    colour[open_sky] = light.sky(rays.take(open_sky, axis=0))
+    colour[solid] = _surfaces(world, origin, rays.take(solid, axis=0), _rows(hits, solid), light)
+    return _develop(colour.reshape(UP, ACROSS, 3), light, rng)
 
 
 def _rows(hits: Hits, rows: np.ndarray) -> Hits:
-    return Hits(hits.distance[rows], hits.normal[rows], hits.material[rows], hits.tint[rows])
+    return Hits(hits.distance[rows], hits.normal.take(rows, axis=0), hits.material[rows], hits.face[rows])
 
 
 def _surfaces(world: World, origin: np.ndarray, rays: np.ndarray, hits: Hits, light: Light) -> np.ndarray:
-    points = (origin + hits.distance[:, None] * rays).astype(np.float32)
-    sunlight = _sunlight(world, points, hits.normal, light)
-    shade = light.ambient * (0.75 + 0.25 * hits.normal[:, 2:3]) + light.sunshine * sunlight[:, None]
-    colour = hits.tint * shade_factor(points, hits.normal, hits.material)[:, None] * shade
+    points = origin + hits.distance[:, None] * rays
+    colour = _tints(world, hits) * shade_factor(points, hits.normal, hits.material)[:, None]
+    skylight = (np.float32(0.75) + np.float32(0.25) * hits.normal[:, 2:3]) * light.ambient
+    colour *= skylight + _sunlight(world, points, hits.normal, light)[:, None] * light.sunshine
     gloss = GLOSS[hits.material]
     shiny = np.flatnonzero(gloss > 0)
     if len(shiny):
-        away = (
-            rays[shiny]
-            - 2 * np.sum(rays[shiny] * hits.normal[shiny], axis=1, keepdims=True) * hits.normal[shiny]
-        )
+        ray, normal = rays[shiny], hits.normal[shiny]
+        away = ray - 2 * np.einsum("ij,ij->i", ray, normal)[:, None] * normal
         colour[shiny] += gloss[shiny, None] * (light.sky(away) - colour[shiny])
-    haze = 1 - np.exp(-hits.distance / light.visibility)[:, None]
-    return colour + haze * (light.horizon - colour)
+    haze = 1 - np.exp(hits.distance / np.float32(-light.visibility))[:, None]
+    return np.asarray(colour + haze * (light.horizon - colour))
+
+
+def _tints(world: World, hits: Hits) -> np.ndarray:
+    tint = world.tint.take(hits.face, axis=0)
+    ground = np.flatnonzero(world.material[hits.face] == GROUND)
+    tint[ground] = COLOUR[hits.material[ground]]
+    return tint
 
 
 def _sunlight(world: World, points: np.ndarray, normal: np.ndarray, light: Light) -> np.ndarray:
@@ -90,8 +101,8 @@ def _sunlight(world: World, points: np.ndarray, normal: np.ndarray, light: Light
     if light.sunshine.max() < 0.02:  # overcast: no shadows to look for
         return sunlight
     lit = np.flatnonzero(facing > 0)
-    to_sun = np.broadcast_to(light.sun, (len(lit), 3))
-    sunlight[lit] = facing[lit] * world.visible(points[lit] + 0.03 * normal[lit], to_sun, np.inf)
+    to_sun = np.broadcast_to(SHADOWS * light.sun, (len(lit), 3))
+    sunlight[lit] = facing[lit] * world.clear(points[lit] + np.float32(0.03) * normal[lit], to_sun)
     return sunlight
 
 
@@ -102,8 +113,12 @@ def _develop(colour: np.ndarray, light: Light, rng: np.random.Generator) -> NDAr
     colour = cv2.GaussianBlur(colour, (3, 3), 0.55)
     level = np.percentile(colour[::4, ::4].mean(-1), 65)
     gain = np.float32(0.45 / max(float(level), 1e-3) * light.exposure)
-    v, u = np.linspace(-1, 1, HEIGHT, dtype=np.float32)[:, None], np.linspace(-1, 1, WIDTH, dtype=np.float32)
-    colour = colour * (gain * (1 - light.vignette * (u**2 + v**2)))[..., None] * light.white_balance
-    curve = np.sqrt(np.maximum(colour / (1 + 0.35 * colour), 0))
-    noise = rng.standard_normal(colour.shape, dtype=np.float32) * light.noise
-    return (np.clip(curve + noise, 0, 1) * 255).astype(np.uint8)
+    v, u = np.linspace(-1, 1, UP, dtype=np.float32)[:, None], np.linspace(-1, 1, ACROSS, dtype=np.float32)
+    colour = (
+        colour * (gain * (1 - np.float32(light.vignette) * (u * u + v * v)))[..., None] * light.white_balance
+    )
+    curve = np.sqrt(np.maximum(colour / (1 + np.float32(0.35) * colour), 0))
+    curve += rng.standard_normal(colour.shape, dtype=np.float32) * np.float32(light.noise)
+    small = (np.clip(curve, 0, 1) * 255).astype(np.uint8)
+    enlarged: NDArray[np.uint8] = cv2.resize(small, (WIDTH, HEIGHT), interpolation=cv2.INTER_CUBIC)
+    return enlarged

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Ray casting by Embree: the `embreex` wheel where it is installed, else open3d."""
+"""Ray casting by Embree, through open3d where it is installed, else through the `embreex` wheel.
+
+Both give the same bits; open3d takes a scene over in a millisecond, embreex copies it number by number.
+"""
 
 from __future__ import annotations
 
@@ -16,19 +19,22 @@ from hybridreg.data.simulate.solids import cross
 @dataclass(frozen=True)
 class Hits:
     """First surface along each ray: distance (n,) metres, inf where there is none; unit normal (n,3) towards
-    the ray's start; material (n,) and tint (n,3) of the face."""
+    the ray's start; material (n,); index (n,) of the face in its world, -1 where there is none."""
 
     distance: NDArray[np.float32]
     normal: NDArray[np.float32]
     material: NDArray[np.uint8]
-    tint: NDArray[np.float32]
+    face: NDArray[np.int32]
 
 
 class Caster(Protocol):
-    """Nearest triangle along rays."""
+    """Nearest triangle along rays (n,6) float32: a start and a direction, whose length is the unit of `t`."""
 
-    def cast(self, origins: np.ndarray, directions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Distance (n,) float32 (inf where none) and face index (n,) of each ray's first triangle."""
+    def cast(self, rays: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """`t` (n,) float32 (inf where none) and face index (n,) int32 (-1 where none) of the first triangle."""
+
+    def blocked(self, rays: np.ndarray) -> np.ndarray:
+        """Whether a triangle stands between t = 0 and t = 1, (n,) bool."""
 
 
 class EmbreexCaster:
@@ -41,13 +47,17 @@ class EmbreexCaster:
         self._scene = EmbreeScene()
         TriangleMesh(self._scene, np.ascontiguousarray(mesh.vertices), np.ascontiguousarray(mesh.faces))
 
-    def cast(self, origins: np.ndarray, directions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def cast(self, rays: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """See `Caster.cast`."""
-        found = self._scene.run(
-            np.ascontiguousarray(origins, np.float32), np.ascontiguousarray(directions, np.float32), output=1
-        )
-        face = found["primID"]
+        start, direction = np.ascontiguousarray(rays[:, :3]), np.ascontiguousarray(rays[:, 3:])
+        found = self._scene.run(start, direction, output=1)
+        face = found["primID"].astype(np.int32)
         return np.where(face >= 0, found["tfar"], np.float32(np.inf)), face
+
+    def blocked(self, rays: np.ndarray) -> np.ndarray:
+        """See `Caster.blocked`."""
+        blocked: np.ndarray = self.cast(rays)[0] < 1
+        return blocked
 
 
 class Open3dCaster:
@@ -56,18 +66,22 @@ class Open3dCaster:
     def __init__(self, mesh: Mesh) -> None:
         from hybridreg._open3d import load_open3d
 
-        self._core = load_open3d().core
-        self._scene = load_open3d().t.geometry.RaycastingScene(nthreads=1)
-        self._scene.add_triangles(
-            self._core.Tensor(mesh.vertices), self._core.Tensor(mesh.faces.astype(np.uint32))
-        )
+        open3d = load_open3d()
+        self._tensor = open3d.core.Tensor
+        # Embree's own threads would fight over the cores with the other workers.
+        self._scene = open3d.t.geometry.RaycastingScene(nthreads=1)
+        self._scene.add_triangles(self._tensor(mesh.vertices), self._tensor(mesh.faces.astype(np.uint32)))
 
-    def cast(self, origins: np.ndarray, directions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def cast(self, rays: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """See `Caster.cast`."""
-        rays = np.concatenate([np.asarray(origins, np.float32), np.asarray(directions, np.float32)], axis=1)
-        found = self._scene.cast_rays(self._core.Tensor(np.ascontiguousarray(rays)))
-        face = found["primitive_ids"].numpy().astype(np.int64)
-        return found["t_hit"].numpy(), np.where(face == self._scene.INVALID_ID, -1, face)
+        found = self._scene.cast_rays(self._tensor(rays))
+        # Open3D's mark of a miss, 2^32 - 1, is -1 when read as a signed number.
+        return found["t_hit"].numpy(), found["primitive_ids"].numpy().view(np.int32)
+
+    def blocked(self, rays: np.ndarray) -> np.ndarray:
+        """See `Caster.blocked`."""
+        blocked: np.ndarray = self._scene.test_occlusions(self._tensor(rays), 0.0, 1.0).numpy()
+        return blocked
 
 
 def make_caster(mesh: Mesh) -> Caster:
@@ -76,14 +90,14 @@ def make_caster(mesh: Mesh) -> Caster:
     Raises
     ------
     ImportError
-        Where neither `embreex` nor `open3d` can be loaded.
+        Where neither `open3d` nor `embreex` can be loaded.
     """
     try:
-        return EmbreexCaster(mesh)
+        return Open3dCaster(mesh)
     except ImportError:
         pass
     try:
-        return Open3dCaster(mesh)
+        return EmbreexCaster(mesh)
     except ImportError as error:
         raise ImportError(f"the simulator needs Embree, run `pip install embreex` ({error})") from error
 
@@ -109,37 +123,37 @@ class World:
     def __init__(self, parts: list[Part]) -> None:
         parts = [part for part in parts if len(part.mesh.faces)]
         self._casters = [part.caster for part in parts]
-        self._first = np.cumsum([0] + [len(part.mesh.faces) for part in parts[:-1]])
+        self._first = np.cumsum([0] + [len(part.mesh.faces) for part in parts[:-1]], dtype=np.int32)
         self._normal = np.concatenate([part.normals for part in parts])
-        self._material = np.concatenate([part.mesh.material for part in parts])
-        self._tint = np.concatenate([part.mesh.tint for part in parts])
+        self.material = np.concatenate([part.mesh.material for part in parts])
+        self.tint = np.concatenate([part.mesh.tint for part in parts])
 
     def cast(self, origins: np.ndarray, directions: np.ndarray) -> Hits:
         """First hits of rays from `origins` (n,3) or (3,) along unit `directions` (n,3)."""
-        origins = _starts(origins, directions)
-        distance, face = self._casters[0].cast(origins, directions)
+        rays = _rays(origins, directions)
+        distance, face = self._casters[0].cast(rays)
         for first, caster in zip(self._first[1:], self._casters[1:], strict=True):
-            t, other = caster.cast(origins, directions)
-            nearer = t < distance
-            distance = np.where(nearer, t, distance)
-            face = np.where(nearer, other + first, face)
-        normal = self._normal[face]  # a ray without a hit has face -1: its normal is never used
-        away = np.einsum("ij,ij->i", normal, directions) > 0
-        normal[away] *= -1
-        return Hits(distance, normal, self._material[face], self._tint[face])
+            t, other = caster.cast(rays)
+            nearer = np.flatnonzero(t < distance)
+            distance[nearer] = t[nearer]
+            face[nearer] = other[nearer] + first
+        normal = self._normal.take(
+            face, axis=0, mode="wrap"
+        )  # a ray without a hit has face -1: its normal is never used
+        along = np.einsum("ij,ij->i", normal, directions)
+        normal *= np.copysign(np.float32(1), -along)[:, None]
+        return Hits(distance, normal, self.material[face], face)
 
-    def visible(
-        self, origins: np.ndarray, directions: np.ndarray, up_to: np.ndarray | float
-    ) -> NDArray[np.bool_]:
-        """Whether nothing stands within `up_to` metres along each ray."""
-        free = np.ones(len(directions), bool)
-        origins = _starts(origins, directions)
-        for caster in self._casters:
-            free[free] = (
-                caster.cast(origins[free], directions[free])[0] >= np.broadcast_to(up_to, free.shape)[free]
-            )
-        return free
+    def clear(self, origins: np.ndarray, segments: np.ndarray) -> NDArray[np.bool_]:
+        """Whether nothing stands on the way (n,3) from `origins` (n,3) or (3,) to `origins + segments`."""
+        rays = _rays(origins, segments)
+        blocked = self._casters[0].blocked(rays)
+        for caster in self._casters[1:]:
+            blocked = blocked | caster.blocked(rays)
+        return ~blocked
 
 
-def _starts(origins: np.ndarray, directions: np.ndarray) -> np.ndarray:
-    return np.ascontiguousarray(np.broadcast_to(np.asarray(origins, np.float32), directions.shape))
+def _rays(origins: np.ndarray, directions: np.ndarray) -> NDArray[np.float32]:
+    rays = np.empty((len(directions), 6), np.float32)
+    rays[:, :3], rays[:, 3:] = origins, directions
+    return rays

@@ -6,6 +6,7 @@ from __future__ import annotations
 import json
 import os
 import shutil
+import zipfile
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -17,23 +18,23 @@ from hybridreg.cloud import PointCloud
 from hybridreg.data.simulate.drawn import Drawn, draw
 from hybridreg.data.simulate.jpeg import decode
 from hybridreg.data.simulate.labelled import pair_id
-from hybridreg.data.simulate.overlaps import thin
 from hybridreg.data.simulate.splits import VERSION, pair_number
+from hybridreg.data.simulate.thinned import thinned
+from hybridreg.data.simulate.tiers import tier_named
 from hybridreg.pair import LabelledPair, Pair
 
 
 def write_pair(folder: Path, drawn: Drawn, facts: dict[str, Any], voxel: float | None) -> Path:
     """One pair as `folder`: source.npz, target.npz, image.jpg, meta.json. The folder appears whole or not at all.
 
-    Coordinates lie on a grid of 1/256 m, so their float32 numbers end in zero bits and compress to about a half;
-    thinned clouds lie in the order of their cubes and compress better still.
+    Coordinates are plain float32 metres that `numpy.load` reads, on a grid of 1/256 m, or of a sixteenth of the
+    voxel: their numbers end in zero bits and compress well.
     """
     part = folder.with_name(f".{folder.name}-{uuid4().hex[:8]}")
     part.mkdir(parents=True)
     try:
         for name, cloud in (("source", drawn.source), ("target", drawn.target)):
-            points = cloud if voxel is None else thin(cloud, voxel)
-            np.savez_compressed(part / f"{name}.npz", xyz=np.asfortranarray(points))
+            _write_cloud(part / f"{name}.npz", thinned(cloud, voxel), small=voxel is not None)
         (part / "image.jpg").write_bytes(drawn.jpeg)
         (part / "meta.json").write_text(json.dumps(_meta(drawn, facts, voxel), indent=1) + "\n")
         if folder.exists():
@@ -42,6 +43,13 @@ def write_pair(folder: Path, drawn: Drawn, facts: dict[str, Any], voxel: float |
     finally:
         shutil.rmtree(part, ignore_errors=True)
     return folder
+
+
+def _write_cloud(path: Path, points: np.ndarray, small: bool) -> None:
+    # LZMA takes 0.1 s for a thinned cloud and 1 s for a whole one: there it would cost more than the drawing.
+    method = zipfile.ZIP_LZMA if small else zipfile.ZIP_DEFLATED
+    with zipfile.ZipFile(path, "w", method) as archive, archive.open("xyz.npy", "w") as member:
+        np.lib.format.write_array(member, np.asfortranarray(points), allow_pickle=False)
 
 
 def _meta(drawn: Drawn, facts: dict[str, Any], voxel: float | None) -> dict[str, Any]:
@@ -82,18 +90,34 @@ def read_pair(folder: Path) -> LabelledPair:
 
 
 def write_one(out: Path, tier: str, split: str, seed: int, index: int, voxel: float | None) -> Path:
-    """Draw pair `index` and write it below `out`; a pair that lies there whole already is kept."""
+    """Draw pair `index` and write it below `out`; a pair that lies there whole already is kept.
+
+    Raises
+    ------
+    ValueError
+        Where the pair that lies there was thinned otherwise, or made by another version.
+    """
     folder = out / f"{tier}-{split}-{seed}-{index:06d}"
-    if not (folder / "meta.json").is_file():
-        facts = {
-            "tier": tier,
-            "split": split,
-            "seed": seed,
-            "index": index,
-            "id": pair_id(split, tier, seed, index),
-        }
-        write_pair(folder, draw(tier, pair_number(split, seed, index)), facts, voxel)
-    return folder
+    if (folder / "meta.json").is_file():
+        _check_kept(folder, voxel)
+        return folder
+    facts = {
+        "tier": tier,
+        "split": split,
+        "seed": seed,
+        "index": index,
+        "id": pair_id(split, tier, seed, index),
+    }
+    return write_pair(folder, draw(tier, pair_number(split, seed, index)), facts, voxel)
+
+
+def _check_kept(folder: Path, voxel: float | None) -> None:
+    meta = json.loads((folder / "meta.json").read_text())
+    for key, now in (("version", VERSION), ("voxel", voxel)):
+        if meta.get(key) != now:
+            raise ValueError(
+                f"{folder}: holds a pair of {key} {meta.get(key)}, not {now}; write to another folder"
+            )
 
 
 def write_pairs(
@@ -109,8 +133,26 @@ def write_pairs(
     """Write `pairs` pairs below `out`, yielding each folder as it is done, in order.
 
     An interrupted run goes on where it stopped. `voxel=0.25` makes a pair some 250 kB, 5 to 6 bytes a point.
+
+    Raises
+    ------
+    ValueError
+        Before anything is written: an unknown tier or split, a seed or number of pairs outside it, a voxel of
+        no width.
     """
+    tier_named(tier)
+    if pairs < 1:
+        raise ValueError(f"pairs={pairs}; ask for one at least")
+    pair_number(split, seed, pairs - 1)
+    if voxel is not None and not 0 < voxel < np.inf:
+        raise ValueError(f"voxel={voxel} m must be positive")
+    return _written(Path(out), tier, split, seed, pairs, voxel, workers)
+
+
+def _written(
+    out: Path, tier: str, split: str, seed: int, pairs: int, voxel: float | None, workers: int
+) -> Iterator[Path]:
     from joblib import Parallel, delayed
 
-    jobs = (delayed(write_one)(Path(out), tier, split, seed, index, voxel) for index in range(pairs))
+    jobs = (delayed(write_one)(out, tier, split, seed, index, voxel) for index in range(pairs))
     yield from Parallel(n_jobs=workers, return_as="generator")(jobs)

@@ -9,15 +9,15 @@ from itertools import count
 from hybridreg.cloud import PointCloud
 from hybridreg.data.simulate.drawn import Drawn, draw
 from hybridreg.data.simulate.jpeg import decode
-from hybridreg.data.simulate.overlaps import thin
 from hybridreg.data.simulate.sensors import Sensor
 from hybridreg.data.simulate.splits import VERSION, pair_number
+from hybridreg.data.simulate.thinned import thinned
 from hybridreg.pair import LabelledPair, Pair
 
 
 def to_labelled(drawn: Drawn, id: str, voxel: float | None = None) -> LabelledPair:
     """`drawn` with its picture decoded; `voxel` thins the clouds to one measured point per cube of that edge."""
-    clouds = [cloud if voxel is None else thin(cloud, voxel) for cloud in (drawn.source, drawn.target)]
+    clouds = [thinned(cloud, voxel) for cloud in (drawn.source, drawn.target)]
     pair = Pair(
         source=PointCloud.of(clouds[0], name=f"{id} source", sensor=drawn.source_sensor),
         target=PointCloud.of(clouds[1], name=f"{id} target", sensor=drawn.target_sensor),

@@ -30,12 +30,12 @@ class Layout:
     )  # movers when the source scans (and the picture is taken)
     at_target: list[Mesh] = field(default_factory=list)  # the same movers when the target scans
     taken: np.ndarray = field(
-        default_factory=lambda: np.zeros((0, 6))
-    )  # x, y, half sizes, cosine and sine of yaw
+        default_factory=lambda: np.zeros((6, 0))
+    )  # rows x, y, half sizes, cosine and sine of yaw
 
     def free(self, xy: np.ndarray, radius: float) -> bool:
         """Whether a disc about `xy` (2,) touches nothing."""
-        x, y, hx, hy, c, s = self.taken.T
+        x, y, hx, hy, c, s = self.taken
         dx, dy = xy[0] - x, xy[1] - y
         gap_x = np.maximum(np.abs(c * dx + s * dy) - hx, 0)
         gap_y = np.maximum(np.abs(c * dy - s * dx) - hy, 0)
@@ -43,8 +43,8 @@ class Layout:
 
     def claim(self, xy: np.ndarray, half: tuple[float, float], yaw: float = 0.0) -> None:
         """Mark a rectangle as taken."""
-        row = [[xy[0], xy[1], half[0], half[1], np.cos(yaw), np.sin(yaw)]]
-        self.taken = np.concatenate([self.taken, row])
+        column = [[xy[0]], [xy[1]], [half[0]], [half[1]], [np.cos(yaw)], [np.sin(yaw)]]
+        self.taken = np.concatenate([self.taken, column], axis=1)
 
     def on_ground(self, thing: Mesh, xy: np.ndarray, yaw: float = 0.0) -> Mesh:
         """`thing` (made about the origin) turned and set down at `xy`."""

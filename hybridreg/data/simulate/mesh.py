@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -28,12 +28,13 @@ class Mesh:
     @staticmethod
     def of(vertices: np.ndarray, faces: np.ndarray, material: str, tint: Colour) -> Mesh:
         """One piece of one material."""
-        n = len(faces)
+        tints = np.empty((len(faces), 3), np.float32)
+        tints[:] = tint
         return Mesh(
             np.asarray(vertices, np.float32),
             np.asarray(faces, np.int32),
-            np.full(n, MATERIAL_INDEX[material], np.uint8),
-            np.broadcast_to(np.asarray(tint, np.float32), (n, 3)),
+            np.full(len(faces), MATERIAL_INDEX[material], np.uint8),
+            tints,
         )
 
     @staticmethod
@@ -53,8 +54,9 @@ class Mesh:
     def moved(self, yaw: float, offset: Sequence[float]) -> Mesh:
         """Turned by `yaw` radians about z, then shifted by `offset` (3,)."""
         c, s = np.cos(yaw), np.sin(yaw)
-        turn = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
-        return replace(self, vertices=(self.vertices @ turn.T + np.asarray(offset)).astype(np.float32))
+        turn = np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]], np.float32)
+        vertices = self.vertices @ turn + np.asarray(offset, np.float32)
+        return Mesh(vertices, self.faces, self.material, self.tint)
 
 
 EMPTY = Mesh(

@@ -17,11 +17,22 @@ RADIUS = 0.5  # metres; the definition that the real pairs' figures use
 
 def thin(points: np.ndarray, voxel: float) -> np.ndarray:
     """One measured point (the first) of each occupied cube of edge `voxel`, cube after cube: it compresses well."""
-    cell = np.floor(points / voxel).astype(np.int64)
+    return points[first_of_cubes(points, voxel)] if len(points) else points
+
+
+def first_of_cubes(points: np.ndarray, voxel: float) -> np.ndarray:
+    """Index (m,) of the first point in each occupied cube, cube after cube."""
+    cell = np.floor(points / voxel)
     cell -= cell.min(axis=0)
-    span = cell.max(axis=0) + 1
-    _, first = np.unique((cell[:, 0] * span[1] + cell[:, 1]) * span[2] + cell[:, 2], return_index=True)
-    return points[first]
+    n, span = len(points), [int(s) + 1 for s in cell.max(axis=0)]
+    if span[0] * span[1] * span[2] * n >= 2**63:
+        raise ValueError(f"voxel={voxel} m is too fine for a cloud of {span} cubes")
+    x, y, z = cell.T.astype(np.int64)
+    # Cube and point in one number: sorting numbers is several times as fast as sorting an index by them.
+    tagged = np.sort(((x * span[1] + y) * span[2] + z) * n + np.arange(n))
+    cube = tagged // n
+    first = np.flatnonzero(np.diff(cube, prepend=-1))
+    return np.asarray(tagged[first] - cube[first] * n)
 
 
 def overlap(
@@ -31,7 +42,11 @@ def overlap(
     if len(source) == 0 or len(target) == 0:
         return 0.0
     moved = source @ T_target_source[:3, :3].T + T_target_source[:3, 3]
-    distance, _ = cKDTree(target).query(moved, distance_upper_bound=radius)
+    low, high = moved.min(axis=0) - radius, moved.max(axis=0) + radius
+    near = target[((target >= low) & (target <= high)).all(axis=1)]
+    # A tree that is not balanced is built three times as fast and asked nearly as fast.
+    tree = cKDTree(near, balanced_tree=False, compact_nodes=False)
+    distance, _ = tree.query(moved, distance_upper_bound=radius)
     return float(np.isfinite(distance).mean())
 
 
@@ -46,7 +61,7 @@ def expected_overlap(
         return 0.0
     points = T_world_source[:3, 3] + hits.distance[seen, None] * directions[seen]
     # One vote per cube, like the measured figure on thinned clouds.
-    _, first = np.unique(np.floor(points / 0.5).astype(np.int64), axis=0, return_index=True)
+    first = first_of_cubes(points, 0.5)
     points, normals = points[first], hits.normal[seen][first]
     ray = points - T_world_target[:3, 3]
     distance = np.linalg.norm(ray, axis=1)
@@ -54,9 +69,8 @@ def expected_overlap(
     reached = _near_a_beam(
         target, ray @ T_world_target[:3, :3], distance, np.abs(np.sum(normals * ray, axis=1))
     )
-    return float(
-        (reached & world.visible(T_world_target[:3, 3], ray.astype(np.float32), distance - 0.3)).mean()
-    )
+    clear = world.clear(T_world_target[:3, 3], ray * (distance - 0.3)[:, None])
+    return float((reached & clear).mean())
 
 
 @lru_cache(maxsize=16)

@@ -11,12 +11,14 @@ from hybridreg.data.simulate.sensors import Sensor
 
 
 def _directions(azimuth: np.ndarray, elevation: np.ndarray) -> np.ndarray:
-    c = np.cos(elevation)
-    return (
-        np.stack([c * np.cos(azimuth), c * np.sin(azimuth), np.sin(elevation)], -1)
-        .reshape(-1, 3)
-        .astype(np.float32)
-    )
+    """Of angles whose shapes broadcast; single precision is a millimetre at a kilometre, and four times as fast."""
+    azimuth, elevation = azimuth.astype(np.float32), elevation.astype(np.float32)
+    directions = np.empty((*np.broadcast_shapes(azimuth.shape, elevation.shape), 3), np.float32)
+    level = np.cos(elevation)
+    directions[..., 0] = level * np.cos(azimuth)
+    directions[..., 1] = level * np.sin(azimuth)
+    directions[..., 2] = np.sin(elevation)
+    return directions.reshape(-1, 3)
 
 
 def spinning(sensor: Sensor, rng: np.random.Generator) -> np.ndarray:
@@ -26,7 +28,7 @@ def spinning(sensor: Sensor, rng: np.random.Generator) -> np.ndarray:
     elevation = np.radians(np.array(sensor.elevations_deg) + rng.normal(0, 0.03, beams))
     start = rng.uniform(0, 2 * np.pi, beams)
     azimuth = start[:, None] + np.arange(steps) * (2 * np.pi / steps)
-    return _directions(azimuth, np.broadcast_to(elevation[:, None], azimuth.shape))
+    return _directions(azimuth, elevation[:, None])
 
 
 def fan(sensor: Sensor, rng: np.random.Generator) -> np.ndarray:
@@ -44,7 +46,7 @@ def fan(sensor: Sensor, rng: np.random.Generator) -> np.ndarray:
         across = (k - 2) * part + 0.525 * part * swing[None, :] + rng.normal(0, 0.0015)
         up = high * tilt[:, None] + 0.012 * swing[None, :] ** 2 * (1 if k % 2 else -1) + rng.normal(0, 0.0015)
         up = up + np.linspace(0, high / rows, columns)[None, :]
-        parts.append(_directions(np.broadcast_to(across, up.shape), up))
+        parts.append(_directions(across, up))
     return np.concatenate(parts)
 
 
@@ -72,7 +74,7 @@ def raster(sensor: Sensor, rng: np.random.Generator) -> np.ndarray:
     elevation = 0.5 * high * (0.35 * u + 0.65 * u**3) + rng.normal(0, 0.0003, rows)
     azimuth = 0.5 * wide * np.linspace(-1, 1, columns)
     shift = rng.uniform(0, wide / columns, rows)[:, None]
-    return _directions(azimuth[None] + shift, np.broadcast_to(elevation[:, None], (rows, columns)))
+    return _directions(azimuth[None] + shift, elevation[:, None])
 
 
 PATTERNS: dict[str, Callable[[Sensor, np.random.Generator], np.ndarray]] = {

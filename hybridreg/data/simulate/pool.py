@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
@@ -26,4 +25,4 @@ def one_of(maker: Maker, rng: np.random.Generator, variants: int = 64, stretch: 
     mesh = _variant(maker, int(rng.integers(variants)))
     scale = np.exp(rng.normal(0, stretch, 3)).astype(np.float32)
     shade = np.float32(rng.uniform(0.8, 1.15))
-    return replace(mesh, vertices=mesh.vertices * scale, tint=mesh.tint * shade)
+    return Mesh(mesh.vertices * scale, mesh.faces, mesh.material, mesh.tint * shade)

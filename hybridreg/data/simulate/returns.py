@@ -24,29 +24,42 @@ def measured_ranges(
     """
     n = len(directions)
     chance = rng.random((4, n), dtype=np.float32)
-    gauss = rng.standard_normal((2, n), dtype=np.float32)
-    t = np.where(np.isfinite(hits.distance), hits.distance, 0.0)
+    gauss = rng.standard_normal(n, dtype=np.float32)
+    hit = hits.face >= 0
+    t = np.where(hit, hits.distance, np.float32(0))
     cosine = np.clip(-np.einsum("ij,ij->i", hits.normal, directions), 0.01, 1.0)
     # The radar equation for a rough surface that fills the beam, against the data sheet's 10 % target.
-    power = REFLECTIVITY[hits.material] / 0.1 * np.sqrt(cosine) * (sensor.range_10 / np.maximum(t, 0.1)) ** 2
-    returned = chance[0] < (1 - LOST[hits.material]) / (1 + power**-2.5)
-    returned &= np.isfinite(hits.distance)
+    reach = np.float32(sensor.range_10) / np.maximum(t, np.float32(0.1))
+    power = 10 * REFLECTIVITY[hits.material] * np.sqrt(cosine) * reach * reach
+    returned = chance[0] * (1 + 1 / (power * power * np.sqrt(power))) < 1 - LOST[hits.material]
+    returned &= hit
     mixed = _mix_edges(t, returned, chance[1], chance[2])
-    spread = sensor.noise_m + sensor.noise_growth * t
-    # A slanted footprint smears the pulse: its length along the ray is divergence x range x tan(incidence).
-    smear = np.minimum(0.04 * sensor.divergence_mrad * 1e-3 * t * np.sqrt(1 - cosine**2) / cosine, 0.15)
-    noise = np.hypot(spread, smear) * gauss[0] + ROUGHNESS[hits.material] * gauss[1]
-    ranges = np.where(returned, mixed + noise, np.nan)
-    inside = ~returned & (hits.material == GLASS) & (chance[1] < INSIDE_SHARE) & (power > 0.3)
+    ranges = np.where(returned, mixed + _noise(sensor, t, cosine, hits.material) * gauss, np.float32(np.nan))
+    inside = np.flatnonzero(~returned & (hits.material == GLASS) & (chance[1] < INSIDE_SHARE) & (power > 0.3))
     ranges[inside] = t[inside] + 0.3 + 4.0 * chance[2][inside] ** 2
-    stray = chance[3] < STRAY_SHARE
+    stray = np.flatnonzero(chance[3] < STRAY_SHARE)
     ranges[stray] = sensor.range_min + 50 * chance[0][stray] ** 2
     ranges[(ranges < sensor.range_min) | (ranges > sensor.range_max)] = np.nan
     return ranges
 
 
+def _noise(sensor: Sensor, t: np.ndarray, cosine: np.ndarray, material: np.ndarray) -> np.ndarray:
+    """Standard deviation (n,) of a range `t`: the clock's, the slanted footprint's and the surface's own."""
+    clock = np.float32(sensor.noise_m) + np.float32(sensor.noise_growth) * t
+    # The footprint's length along the ray is divergence x range x tan(incidence).
+    slant = np.sqrt(1 - cosine * cosine) / cosine
+    smear = np.minimum(np.float32(0.04e-3 * sensor.divergence_mrad) * t * slant, np.float32(0.15))
+    rough = ROUGHNESS[material]
+    return np.asarray(np.sqrt(clock * clock + smear * smear + rough * rough))
+
+
 def _mix_edges(t: np.ndarray, returned: np.ndarray, chance: np.ndarray, share: np.ndarray) -> np.ndarray:
     """A pulse half on an edge reports a range between the two surfaces when they are within a pulse length."""
     behind = np.roll(t, -1) - t
-    edge = returned & np.roll(returned, -1) & (np.abs(behind) > 0.15) & (np.abs(behind) < 2.5)
-    return np.where(edge & (chance < MIXED_SHARE), t + share * behind, t)
+    depth = np.abs(behind)
+    edge = np.flatnonzero(
+        (chance < MIXED_SHARE) & (depth > 0.15) & (depth < 2.5) & returned & np.roll(returned, -1)
+    )
+    mixed = t.copy()
+    mixed[edge] += share[edge] * behind[edge]
+    return mixed

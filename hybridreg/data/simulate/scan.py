@@ -10,20 +10,19 @@ from numpy.typing import NDArray
 
 from hybridreg.data.simulate.caster import Hits, World
 from hybridreg.data.simulate.layout import Surface
-from hybridreg.data.simulate.materials import COLOUR, GROUND
+from hybridreg.data.simulate.materials import GROUND
 from hybridreg.data.simulate.patterns import pattern
 from hybridreg.data.simulate.returns import measured_ranges
 from hybridreg.data.simulate.sensors import Sensor
 
 
 def with_ground(hits: Hits, origin: np.ndarray, directions: np.ndarray, surface: Surface) -> Hits:
-    """Hits on the terrain given the material and colour that lie there."""
-    ground = (hits.material == GROUND) & np.isfinite(hits.distance)
-    xy = origin[:2] + hits.distance[ground, None] * directions[ground, :2]
-    material, tint = hits.material.copy(), hits.tint.copy()
+    """Hits on the terrain given the material that lies there."""
+    ground = np.flatnonzero((hits.material == GROUND) & (hits.face >= 0))
+    xy = origin[:2].astype(np.float32) + hits.distance[ground, None] * directions.take(ground, axis=0)[:, :2]
+    material = hits.material.copy()
     material[ground] = surface(xy[:, 0], xy[:, 1])
-    tint[ground] = COLOUR[material[ground]]
-    return replace(hits, material=material, tint=tint)
+    return replace(hits, material=material)
 
 
 def scan(
@@ -32,9 +31,11 @@ def scan(
     """Points (n,3) float32 in the sensor's frame, on its grid of `quantum_m`, in firing order."""
     directions = pattern(sensor, rng)
     rotation, origin = T_world_sensor[:3, :3], T_world_sensor[:3, 3]
-    rays = (directions @ rotation.T.astype(np.float32)).astype(np.float32)
+    rays = directions @ rotation.T.astype(np.float32)
     hits = with_ground(world.cast(origin, rays), origin, rays, surface)
     ranges = measured_ranges(sensor, rays, hits, rng)
-    kept = np.isfinite(ranges)
-    points = directions[kept] * ranges[kept, None]
-    return (np.round(points / sensor.quantum_m) * sensor.quantum_m).astype(np.float32)
+    kept = np.flatnonzero(np.isfinite(ranges))
+    # take() gathers rows several times as fast as indexing does, here and below.
+    points = directions.take(kept, axis=0)
+    points *= ranges.take(kept)[:, None] / np.float32(sensor.quantum_m)
+    return np.rint(points, out=points) * np.float32(sensor.quantum_m)

@@ -11,7 +11,7 @@ from hybridreg.data.simulate.mesh import Colour, Mesh
 
 _BOX = np.array(
     [[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0], [-1, -1, 1], [1, -1, 1], [1, 1, 1], [-1, 1, 1]]
-)
+) * [0.5, 0.5, 1.0]
 # No bottom: nothing simulated is ever seen from below at the height where it stands on the ground.
 _BOX_FACES = np.array(
     [
@@ -25,24 +25,25 @@ _BOX_FACES = np.array(
         [2, 7, 6],
         [3, 0, 4],
         [3, 4, 7],
-    ]
+    ],
+    np.int32,
 )
 
 
 def _repeat(template: np.ndarray, copies: int, stride: int) -> np.ndarray:
-    return (template[None] + (np.arange(copies) * stride)[:, None, None]).reshape(-1, 3)
+    return (template + np.arange(0, copies * stride, stride, dtype=np.int32)[:, None, None]).reshape(-1, 3)
 
 
 def boxes(base: np.ndarray, size: np.ndarray, yaw: float | np.ndarray, material: str, tint: Colour) -> Mesh:
     """Boxes standing on `base` (n,3) with edges `size` (n,3), turned by `yaw` (n,) radians; open below."""
-    base = np.atleast_2d(base)
-    n = len(base)
-    local = _BOX[None] * (np.broadcast_to(size, (n, 3)) * [0.5, 0.5, 1.0])[:, None, :]
-    angle = np.broadcast_to(np.asarray(yaw, float), (n,))
-    c, s = np.cos(angle)[:, None], np.sin(angle)[:, None]
+    local = _BOX * np.asarray(size).reshape(-1, 1, 3)
+    angle = np.asarray(yaw).reshape(-1, 1)
+    c, s = np.cos(angle), np.sin(angle)
     x, y = local[..., 0], local[..., 1]
-    corners = np.stack([c * x - s * y, s * x + c * y, local[..., 2]], -1) + base[:, None, :]
-    return Mesh.of(corners.reshape(-1, 3), _repeat(_BOX_FACES, n, 8), material, tint)
+    corners = np.empty((len(base), 8, 3))
+    corners[..., 0], corners[..., 1], corners[..., 2] = c * x - s * y, s * x + c * y, local[..., 2]
+    corners += base[:, None]
+    return Mesh.of(corners.reshape(-1, 3), _repeat(_BOX_FACES, len(base), 8), material, tint)
 
 
 def tubes(

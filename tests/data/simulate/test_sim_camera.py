@@ -5,7 +5,7 @@ import cv2
 import numpy as np
 
 from hybridreg.data.simulate import SCENES, Drawn
-from hybridreg.data.simulate.camera import Camera, photograph
+from hybridreg.data.simulate.camera import ACROSS, UP, Camera, photograph
 from hybridreg.data.simulate.drawn import world_with
 from hybridreg.data.simulate.light import Light
 from hybridreg.data.simulate.stands import single_stand
@@ -19,6 +19,7 @@ def test_pictures_are_neither_black_nor_burnt_nor_flat(mid_pair: Drawn) -> None:
     picture = picture_of(mid_pair.jpeg).astype(float)
     assert 40 < picture.mean() < 220
     assert picture.std() > 15
+    assert picture.shape == (288, 512, 3)
     assert (picture >= 254).all(axis=2).mean() < 0.3
 
 
@@ -29,9 +30,9 @@ def test_camera_looks_where_the_source_looks() -> None:
         camera = Camera.near(pose, rng)
         assert camera.T_world_camera[0, 0] > np.cos(np.radians(20))
         assert np.linalg.norm(camera.T_world_camera[:3, 3]) < 1.0
-        middle = camera.rays(rng).reshape(288, 512, 3)[144, 256]
+        middle = camera.rays(rng).reshape(UP, ACROSS, 3)[UP // 2, ACROSS // 2]
         assert middle @ camera.T_world_camera[:3, 0] > 0.999
-        left, right = camera.rays(rng).reshape(288, 512, 3)[144, [0, -1]]
+        left, right = camera.rays(rng).reshape(UP, ACROSS, 3)[UP // 2, [0, -1]]
         assert left @ camera.T_world_camera[:3, 1] > 0.4  # y is to the left
         assert right @ camera.T_world_camera[:3, 1] < -0.4
 

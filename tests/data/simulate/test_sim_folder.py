@@ -11,6 +11,8 @@ import hybridreg.data
 from hybridreg.data import simulate
 from hybridreg.data.simulate import Drawn, Sensor, folder
 from hybridreg.data.simulate.folder import read_pair, write_pair, write_pairs
+from hybridreg.data.simulate.overlaps import thin
+from hybridreg.data.simulate.thinned import step, thinned
 
 FACTS = {"id": "sim:train/mid/0/11", "tier": "mid", "seed": 0}
 
@@ -48,7 +50,7 @@ def test_a_pair_is_written_whole_or_not_at_all(
     def full_disk(*_: object, **__: object) -> None:
         raise OSError("disk full")
 
-    monkeypatch.setattr(folder.np, "savez_compressed", full_disk)
+    monkeypatch.setattr(folder, "_write_cloud", full_disk)
     with pytest.raises(OSError, match="disk full"):
         write_pair(tmp_path / "one", mid_pair, FACTS, None)
     assert list(tmp_path.iterdir()) == []
@@ -65,12 +67,25 @@ def test_runs_resume_and_workers_change_nothing(
     assert len(drawn) == 3
 
 
-def test_thinned_clouds_take_less_than_six_and_a_half_bytes_a_point(tmp_path: Path) -> None:
-    path = next(iter(write_pairs(tmp_path, tier="mid", pairs=1, seed=1, voxel=0.25)))
+def test_thinned_clouds_take_less_than_four_bytes_a_point(tmp_path: Path, mid_pair: Drawn) -> None:
+    path = write_pair(tmp_path / "one", mid_pair, FACTS, 0.25)
     for name in ("source.npz", "target.npz"):
         points = np.load(path / name)["xyz"]
         assert len(points) > 2000
-        assert (path / name).stat().st_size < 6.5 * len(points)
+        assert (path / name).stat().st_size < 4 * len(points)
+
+
+@pytest.mark.parametrize(("voxel", "size"), [(0.25, 1 / 64), (0.3, 1 / 64), (0.1, 1 / 256), (1.0, 1 / 16)])
+def test_thinned_points_are_measured_points_rounded_to_a_part_of_the_cube(
+    mid_pair: Drawn, voxel: float, size: float
+) -> None:
+    assert step(voxel) == size
+    points = thinned(mid_pair.target, voxel)
+    exact = thin(mid_pair.target, voxel)
+    assert points.dtype == np.float32
+    np.testing.assert_array_equal(points / size, np.rint(points / size))
+    assert np.abs(points - exact).max() <= size / 2
+    assert thinned(mid_pair.target, None) is mid_pair.target
 
 
 def test_the_pair_that_ships_is_sound(thin_sensors: tuple[Sensor, Sensor]) -> None:

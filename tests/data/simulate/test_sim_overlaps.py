@@ -33,6 +33,13 @@ def test_overlap_is_the_share_within_reach_under_the_transform(seed: int) -> Non
     assert overlap(source[far], target, T) == 0.0
 
 
+def test_cubes_too_fine_to_number_are_refused() -> None:
+    far = np.array([[0.0, 0, 0], [1e6, 1e6, 1e6]], np.float32)
+    with pytest.raises(ValueError, match="voxel=0.0001 m is too fine"):
+        thin(far, 0.0001)
+
+
 def test_empty_clouds_share_nothing() -> None:
     assert overlap(np.zeros((0, 3)), np.zeros((5, 3)), np.eye(4)) == 0.0
     assert overlap(np.zeros((5, 3)), np.zeros((0, 3)), np.eye(4)) == 0.0
+    assert thin(np.zeros((0, 3), np.float32), 0.25).shape == (0, 3)

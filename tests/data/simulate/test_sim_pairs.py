@@ -64,7 +64,7 @@ def test_the_truth_aligns_the_clouds_and_its_inverse_does_not(mid_pair: Drawn) -
 
 
 def test_frames_are_turned_freely_and_tilted_a_little(thin_sensors: tuple[Sensor, Sensor]) -> None:
-    poses = [draw("mid", k, *thin_sensors).T_target_source for k in range(20, 24)]
+    poses = [draw("mid", k, *thin_sensors).T_target_source for k in (20, 21, 22)]
     yaw = np.degrees([np.arctan2(T[1, 0], T[0, 0]) for T in poses])
     tilt = np.degrees([np.arccos(T[2, 2]) for T in poses])
     assert np.ptp(yaw) > 90

@@ -20,7 +20,7 @@ def wall(distance: float | np.ndarray, cosine: float = 1.0, material: str = "con
     normal = np.tile(np.float32([-cosine, np.sqrt(1 - cosine**2), 0]), (N, 1))
     distances = np.broadcast_to(np.float32(distance), (N,)).copy()
     index = np.full(N, MATERIAL_INDEX[material], np.uint8)
-    hits = Hits(distances, normal, index, np.zeros((N, 3), np.float32))
+    hits = Hits(distances, normal, index, np.where(np.isfinite(distances), 0, -1).astype(np.int32))
     return measured_ranges(SENSOR, directions, hits, np.random.default_rng(0))
 
 
@@ -86,7 +86,7 @@ def test_power_is_calibrated_to_the_data_sheet() -> None:
     sensor = replace(SENSOR, range_10=40.0)
     dark = Hits(
         np.full(N, 40.0, np.float32), np.tile(np.float32([-1, 0, 0]), (N, 1)),
-        np.full(N, MATERIAL_INDEX["dark_paint"], np.uint8), np.zeros((N, 3), np.float32),
+        np.full(N, MATERIAL_INDEX["dark_paint"], np.uint8), np.zeros(N, np.int32),
     )  # fmt: skip
     ranges = measured_ranges(sensor, np.tile(np.float32([1, 0, 0]), (N, 1)), dark, np.random.default_rng(0))
     assert share(ranges) == pytest.approx(0.5 * (1 - 0.35), abs=0.03)  # dark paint loses 35 % besides

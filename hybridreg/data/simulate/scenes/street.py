@@ -51,7 +51,7 @@ class Course:
 
     def bend(self, x: np.ndarray | float) -> np.ndarray:
         """Middle of the street at `x`."""
-        return self.sway * np.sin(2 * np.pi * np.asarray(x, float) / self.length + self.phase)
+        return self.sway * np.sin((2 * np.pi / self.length) * x + self.phase)
 
     def yaw(self, x: float) -> float:
         """Direction of the street at `x`, radians."""

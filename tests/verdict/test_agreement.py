@@ -1,0 +1,97 @@
+# SPDX-License-Identifier: MIT
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from made_places import Made
+
+from hybridreg import se3
+from hybridreg.verdict import views
+from hybridreg.verdict.agreement import Agreement, compare, main_axes
+from hybridreg.verdict.rivals import support
+
+SHIFT = se3.from_rt(np.eye(3), np.array([3.0, 0.0, 0.0]))
+
+
+def agreement(made: Made, T: np.ndarray) -> Agreement:
+    source, target = views.views(made.scene)
+    return compare(source, target, T, views.spacing(made.scene))
+
+
+def test_at_the_true_pose_the_clouds_agree_along_every_axis(crossing: Made) -> None:
+    found = agreement(crossing, crossing.truth)
+    assert found.shares.min() > 0.5
+    assert found.looked_through < 0.08
+
+
+def test_three_metres_along_the_street_only_the_surfaces_across_it_disagree(crossing: Made) -> None:
+    right, wrong = agreement(crossing, crossing.truth), agreement(crossing, SHIFT @ crossing.truth)
+    assert wrong.looked_through > 2.0 * right.looked_through
+    along = np.argmax(np.abs(wrong.axes @ [1.0, 0.0, 0.0]))
+    up = np.argmax(np.abs(wrong.axes @ [0.0, 0.0, 1.0]))
+    assert wrong.shares[along] < 0.3 < 0.5 < wrong.shares[up]
+
+
+def test_points_that_the_other_sensor_could_not_see_do_not_count(fan: Made) -> None:
+    found = agreement(fan, fan.truth)
+    # A 120 degree raster can look at no more than a third of what the full circle saw.
+    assert found.target.looked.mean() < 0.34 < 0.5 < found.source.looked.mean()
+    assert found.shares.min() > 0.4
+
+
+def test_evidence_is_the_same_seen_from_either_cloud(crossing: Made) -> None:
+    source, target = views.views(crossing.scene)
+    spacing = views.spacing(crossing.scene)
+    there = compare(source, target, crossing.truth, spacing)
+    back = compare(target, source, se3.inverse(crossing.truth), spacing)
+    assert np.array_equal(there.looked, back.looked)
+    assert np.array_equal(there.agreed, back.agreed)
+    assert there.looked_through == back.looked_through
+
+
+@given(st.integers(0, 2**32 - 1))
+def test_axes_lie_along_floor_and_walls_though_all_are_equally_common(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    R = se3.random_rotation(rng)
+    normals = np.repeat(np.eye(3), 400, axis=0) + rng.normal(0.0, 0.05, (1200, 3))
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    axes = main_axes(normals[:600] @ R.T, normals[600:] @ R.T)
+    assert axes @ axes.T == pytest.approx(np.eye(3), abs=1e-9)
+    assert np.abs(axes @ R).max(axis=0) == pytest.approx(np.ones(3), abs=1e-3)
+
+
+def test_the_commonest_direction_comes_first() -> None:
+    normals = np.repeat(np.eye(3), [100, 700, 300], axis=0)
+    assert np.abs(main_axes(normals)).argmax(axis=1).tolist() == [1, 2, 0]
+
+
+def test_few_points_count_for_little() -> None:
+    made = Agreement(
+        source=None,  # type: ignore[arg-type]
+        target=None,  # type: ignore[arg-type]
+        axes=np.eye(3),
+        looked=np.array([1000.0, 100.0, 5.0]),
+        agreed=np.array([900.0, 90.0, 5.0]),
+        through=np.zeros(3),
+    )
+    assert made.shares == pytest.approx([900 / 1020, 90 / 120, 5 / 25])
+    assert support(made) == pytest.approx(0.2)
+
+
+def test_without_a_viewpoint_nothing_is_looked_through(crossing: Made) -> None:
+    source, target = (dataclasses.replace(view, image=None) for view in views.views(crossing.scene))
+    found = compare(source, target, SHIFT @ crossing.truth, views.spacing(crossing.scene))
+    assert found.looked_through == 0.0
+    assert not found.source.hidden.any()
+    assert found.shares.min() < 0.35
+
+
+def test_a_share_of_the_asked_points_gives_nearly_the_same_shares(crossing: Made) -> None:
+    source, target = views.views(crossing.scene)
+    spacing = views.spacing(crossing.scene)
+    whole, part = (compare(source, target, crossing.truth, spacing, every=n) for n in (1, 5))
+    assert part.shares == pytest.approx(whole.shares, abs=0.12)

@@ -1,0 +1,69 @@
+# SPDX-License-Identifier: MIT
+"""On real pairs; `python -m benchmarks.verdict_rates` runs all of them, with poses refined by small_gicp."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hybridreg import se3
+from hybridreg.classical.voxel import VoxelGrid
+from hybridreg.cloud import PointCloud
+from hybridreg.matches import Correspondences, Pose
+from hybridreg.pair import Pair
+from hybridreg.scene import Scene
+from hybridreg.verdict import judge, views
+from hybridreg.verdict.settle import settle
+
+# Another sensor at another density, off the road, hanging sideways, and a plain street.
+PAIRS = ["opencalib-hesai1-qt201-to-p64", "rellis-vlp32-to-os64", "balm-os-40-to-0", "sustech-965-to-950"]
+
+
+def scene_of(folder: Path, source: str, target: str) -> Scene:
+    clouds = [np.load(folder / name)["xyz"] for name in (f"{source}/source.npz", f"{target}/target.npz")]
+    return VoxelGrid()(Pair(source=PointCloud.of(clouds[0]), target=PointCloud.of(clouds[1])))
+
+
+def truth_of(folder: Path, name: str) -> np.ndarray:
+    return np.array(json.loads((folder / name / "meta.json").read_text())["T_target_source"])
+
+
+@pytest.mark.parametrize("name", PAIRS)
+def test_true_pose_ok_and_its_half_turn_and_slides_failed(real_data: Path, name: str) -> None:
+    if not (real_data / name).is_dir():
+        pytest.skip(f"no pair {name}")
+    scene, truth = scene_of(real_data, name, name), truth_of(real_data, name)
+    assert judge(scene, Pose(truth), Correspondences.none()).verdict == "ok"
+    up, street = _axes(scene)
+    half = se3.rotation_about(np.pi * up)
+    wrong = [se3.from_rt(half, truth[:3, 3] - half @ truth[:3, 3]) @ truth]
+    wrong += [se3.from_rt(np.eye(3), metres * street) @ truth for metres in (-10.0, 10.0)]
+    for T in (settle(*views.views(scene), T, views.spacing(scene)) for T in wrong):
+        if np.linalg.norm((T - truth)[:3, 3]) > 1.0 or se3.angle_deg(T[:3, :3] @ truth[:3, :3].T) > 5.0:
+            judgement = judge(scene, Pose(T), Correspondences.none())
+            assert judgement.verdict == "failed", judgement.reasons
+
+
+def _axes(scene: Scene) -> tuple[np.ndarray, np.ndarray]:
+    spread = np.linalg.eigh(np.cov(scene.target.points.T))[1]
+    return spread[:, 0], spread[:, 2]
+
+
+def test_different_places_are_failed(real_data: Path) -> None:
+    if not all((real_data / name).is_dir() for name in PAIRS):
+        pytest.skip("not all pairs are there")
+    for i, source in enumerate(PAIRS):
+        scene = scene_of(real_data, source, PAIRS[i - 1])
+        both, spacing = views.views(scene), views.spacing(scene)
+        settled = [settle(*both, se3.yaw(float(yaw)), spacing) for yaw in range(0, 360, 120)]
+        covered = [np.isfinite(_gaps(scene, T)).mean() for T in settled]
+        judgement = judge(scene, Pose(settled[int(np.argmax(covered))]), Correspondences.none())
+        assert judgement.verdict == "failed", (source, judgement.reasons)
+
+
+def _gaps(scene: Scene, T: np.ndarray) -> np.ndarray:
+    source, target = views.views(scene)
+    return target.tree.query(se3.apply(T, source.points), distance_upper_bound=0.5)[0]
