@@ -2,6 +2,8 @@
 """Makes the pair that ships in hybridreg/data/demo: a MEMS fan against a 64-beam spinning LiDAR.
 
 python benchmarks/simulator_demo.py
+
+The pair that lies there was made by version 1 of the simulator; another version makes another pair.
 """
 
 from __future__ import annotations

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Ray casting by Embree, through open3d where it is installed, else through the `embreex` wheel.
 
-Both give the same bits; open3d takes a scene over in a millisecond, embreex copies it number by number.
+Both gave the same bits wherever they were compared; open3d takes a scene over in a millisecond, embreex copies
+it number by number.
 """
 
 from __future__ import annotations
