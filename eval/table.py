@@ -62,8 +62,10 @@ class Table:
     def caption(self, protocol: Protocol) -> str:
         """Which number is this: the data, the starts, the protocol."""
         n = max((len(entry.rows) for entry in self.entries), default=0)
-        starts = f", each as it is and under {self.starts} random yaw starts" if self.starts else ""
-        return f"{self.title}. Data {self.data or 'unnamed'}, {n} pairs{starts}; {protocol.describe()}"
+        runs = f"{n} pairs"
+        if self.starts:
+            runs = f"{n // (self.starts + 1)} pairs, each as it is and under {self.starts} random yaw starts, {n} runs"
+        return f"{self.title}. Data {self.data or 'unnamed'}, {runs}; {protocol.describe()}"
 
 
 def run(
