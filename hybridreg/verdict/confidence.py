@@ -18,11 +18,14 @@ Word = Literal["ok", "doubtful", "failed"]
 
 OK, FAILED = 0.95, 0.5
 # Per unit of each number; all four are shares between 0 and 1.
-WEIGHTS = {"agreement_least": 2.0, "agreement_middle": 1.25, "looked_through": -13.0, "rival_margin": -8.5}
-INTERCEPT = -0.95
+WEIGHTS = {"agreement_least": 4.8, "agreement_middle": 0.6, "looked_through": -10.7, "rival_margin": -6.5}
+INTERCEPT = -0.9
 # A rival that is far behind, or far ahead, says no more than one that is this far. The simulated scenes, divided by
 # scene for cross-validation, were told apart best with 0.3 to 0.5.
 MARGIN_COUNTS = 0.4
+
+# A rival explains the data nearly as well when its support comes within this of the pose's.
+NEARLY = 0.1
 
 
 def confidence(evidence: Mapping[str, float]) -> float:
@@ -30,7 +33,9 @@ def confidence(evidence: Mapping[str, float]) -> float:
     margin = float(np.clip(evidence["rival_margin"], -MARGIN_COUNTS, MARGIN_COUNTS))
     numbers = {**evidence, "rival_margin": margin}
     score = INTERCEPT + sum(weight * numbers[name] for name, weight in WEIGHTS.items())
-    return float(1.0 / (1.0 + np.exp(-score)))
+    # Two poses that explain the data alike share the probability, however well they explain it.
+    ceiling = 0.5 + 0.5 * float(np.clip(-margin / NEARLY, 0.0, 1.0))
+    return min(float(1.0 / (1.0 + np.exp(-score))), ceiling)
 
 
 def word(probability: float) -> Word:

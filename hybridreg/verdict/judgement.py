@@ -15,7 +15,7 @@ from hybridreg.matches import Correspondences, Pose
 from hybridreg.scene import Scene
 from hybridreg.verdict import information, rivals, views
 from hybridreg.verdict.agreement import Agreement, OneWay, compare
-from hybridreg.verdict.confidence import Word, confidence, word
+from hybridreg.verdict.confidence import NEARLY, Word, confidence, word
 from hybridreg.verdict.information import Information
 from hybridreg.verdict.rivals import Rival
 from hybridreg.verdict.views import View
@@ -23,10 +23,7 @@ from hybridreg.verdict.words import reasons
 
 Array = NDArray[np.float64]
 
-# A rival explains the data nearly as well when its support comes within this of the pose's. In simulated scenes
-# one in twenty right poses had such a rival, nearly all of them in bare corridors.
-NEARLY = 0.1
-# With nothing to say against the pose and nothing for it either.
+# The rival margin where there is no rival to compare with.
 _NO_RIVAL = -1.0
 
 

@@ -8,10 +8,11 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 
 from hybridreg.verdict.agreement import Agreement
+from hybridreg.verdict.confidence import NEARLY
 from hybridreg.verdict.information import Information
 
 # Where a number becomes worth a sentence. In simulated scenes nine in ten right poses stayed on the good side.
-LOOKED_THROUGH, AGREEMENT, WEAK, NEARLY, OVERLAP, FEW = 0.12, 0.3, 0.02, 0.1, 0.15, 60
+LOOKED_THROUGH, AGREEMENT, WEAK, OVERLAP, FEW = 0.12, 0.3, 0.02, 0.15, 60
 
 
 def reasons(

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hybridreg.verdict.confidence import FAILED, OK, WEIGHTS, confidence, word
+from hybridreg.verdict.confidence import FAILED, NEARLY, OK, WEIGHTS, confidence, word
 
 share = st.floats(0.0, 1.0)
 evidence = st.fixed_dictionaries({**dict.fromkeys(WEIGHTS, share), "rival_margin": st.floats(-1.5, 1.5)})
@@ -22,6 +22,12 @@ def test_more_agreement_and_fewer_objections_never_lower_it(
 def test_other_evidence_is_left_aside() -> None:
     numbers = dict.fromkeys(WEIGHTS, 0.2)
     assert confidence({**numbers, "normals": 0.9}) == confidence(numbers)
+
+
+@given(evidence)
+def test_two_poses_that_explain_the_data_alike_are_never_ok(numbers: dict[str, float]) -> None:
+    assert confidence({**numbers, "rival_margin": 0.0}) <= 0.5
+    assert word(confidence({**numbers, "rival_margin": -0.8 * NEARLY})) != "ok"
 
 
 @pytest.mark.parametrize(
