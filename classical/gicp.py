@@ -13,6 +13,7 @@ from hybridreg.classical.voxel import voxel_centroids
 from hybridreg.fitness import measure
 from hybridreg.matches import Pose
 from hybridreg.normals import tree
+from hybridreg.resources import n_threads
 from hybridreg.scene import Scene
 from hybridreg.stage import Stage
 
@@ -90,5 +91,5 @@ def _prepare(points: Array, voxel: float, neighbours: int) -> tuple[Any, Any]:
 
     cloud = small_gicp.PointCloud(voxel_centroids(points, voxel))
     kd_tree = small_gicp.KdTree(cloud)
-    small_gicp.estimate_covariances(cloud, kd_tree, min(neighbours, cloud.size()), 2)
+    small_gicp.estimate_covariances(cloud, kd_tree, min(neighbours, cloud.size()), max(1, n_threads()))
     return cloud, kd_tree
