@@ -127,6 +127,14 @@ def test_table_then_report_under_other_protocols(pairs: Path, tmp_path: Path) ->
     assert (out / "report.html").read_text().count("source, true pose") > 0
 
 
+def test_table_takes_other_starts_than_the_file(pairs: Path) -> None:
+    Path("mine.toml").write_text("starts = 1\n" + TABLE)
+    result = call("table", "mine.toml", "--data", pairs, "--starts", "0")
+    assert result.exit_code == 0, result.output
+    rows = read(next((Path("runs") / "mine" / "predictions").iterdir())).rows
+    assert [row.id for row in rows] == ["a-right", "b-off", "c-broken"]
+
+
 def test_report_of_single_files_and_of_data_that_has_gone(pairs: Path, tmp_path: Path) -> None:
     (tmp_path / "mine.toml").write_text(TABLE)
     assert call("table", "mine.toml", "--data", pairs).exit_code == 0

@@ -20,6 +20,9 @@ def command(
         str | None, typer.Option(help="Folder of pairs, or name:rest; overrides the file.")
     ] = None,
     protocols: options.Protocols = None,
+    starts: Annotated[
+        int | None, typer.Option(min=0, help="Turned copies of each pair; overrides the file.")
+    ] = None,
     workers: options.Workers = 1,
     out: Annotated[Path | None, typer.Option(help="Folder; runs/<file's name> if not given.")] = None,
     overwrite: options.Overwrite = False,
@@ -32,6 +35,8 @@ def command(
     read = recipe.read(file)
     if protocols:
         read = dataclasses.replace(read, protocols=tuple(protocol(name) for name in protocols))
+    if starts is not None:
+        read = dataclasses.replace(read, starts=starts)
     where = data or read.data
     if not where:
         raise ValueError(f"{file} names no data; give --data, a folder of pairs or name:rest of a loader")
