@@ -40,14 +40,11 @@ def _counter(counted: Counter[str], module: nn.Module) -> Any:
 
     def convolution(_: nn.Module, args: tuple[Any, ...], out: torch.Tensor) -> None:
         assert isinstance(module, kpconv.KPConv)
-        _, queries, supports, neighbors = args[:4]
-        influence = args[4] or kpconv.kernel_influence(
-            queries, supports, neighbors, module.kernel, module.sigma
-        )
+        _, neighbors, influence = args
         n_kernel, dim_in, dim_out = module.weights.shape
-        counted["KPConv, gathering"] += len(influence.index) * dim_in
-        counted["KPConv, products"] += len(queries) * n_kernel * dim_in * dim_out
-        counted["KPConv, influences"] += neighbors.numel() * n_kernel * 3
+        counted["KPConv, gathering"] += sum(map(len, influence.support)) * dim_in
+        counted["KPConv, products"] += len(neighbors) * n_kernel * dim_in * dim_out
+        counted["KPConv, influences"] += int((neighbors < influence.n_supports).sum()) * n_kernel * 4
 
     def image(_: nn.Module, args: tuple[Any, ...], out: torch.Tensor) -> None:
         assert isinstance(module, nn.Conv2d)

@@ -10,7 +10,8 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional as F
 
-from hybridreg.learned.kpconv import Influence, KPConv
+from hybridreg.learned.influence import Influence, Links, kernel_influence
+from hybridreg.learned.kpconv import KPConv
 from hybridreg.learned.max_pool import max_pool
 
 _SLOPE = 0.1
@@ -21,12 +22,15 @@ _EPS = 1e-5
 class Surroundings:
     """What a block needs to know of the geometry: where it computes, from where, and through which links."""
 
-    queries: Tensor  # (N, 3)
-    supports: Tensor  # (M, 3)
     neighbors: Tensor  # (N, k) into the supports, pad M
     lengths: tuple[int, int]  # queries of the target, of the source
     support_lengths: tuple[int, int]
-    influence: Influence | None = None
+    links: Links
+    influence: Influence | None = None  # where the layers share their kernel points
+
+    def influence_of(self, conv: KPConv) -> Influence:
+        """Influences of the neighbours on a layer's kernel points."""
+        return self.influence or kernel_influence(self.links, conv.kernel, conv.sigma)
 
 
 class PointGroupNorm(nn.Module):
@@ -100,7 +104,7 @@ class ConvBlock(nn.Module):
 
     def forward(self, features: Tensor, around: Surroundings) -> Tensor:
         """(M, C_in) to (N, C_out)."""
-        features = self.conv(features, around.queries, around.supports, around.neighbors, around.influence)
+        features = self.conv(features, around.neighbors, around.influence_of(self.conv))
         return F.leaky_relu_(self.norm(features, around.lengths), _SLOPE)
 
 
@@ -124,7 +128,7 @@ class ResidualBlock(nn.Module):
     def forward(self, features: Tensor, around: Surroundings) -> Tensor:
         """(M, C_in) to (N, C_out)."""
         main = features if self.unary_in is None else self.unary_in(features, around.support_lengths)
-        main = self.conv(main, around.queries, around.supports, around.neighbors, around.influence)
+        main = self.conv(main, around.neighbors, around.influence_of(self.conv))
         main = self.unary_out(F.leaky_relu_(self.norm(main, around.lengths), _SLOPE), around.lengths)
         shortcut = max_pool(features, around.neighbors) if self.strided else features
         if self.unary_shortcut is not None:
