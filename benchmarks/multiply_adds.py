@@ -42,9 +42,9 @@ def _counter(counted: Counter[str], module: nn.Module) -> Any:
         assert isinstance(module, kpconv.KPConv)
         _, neighbors, influence = args
         n_kernel, dim_in, dim_out = module.weights.shape
-        counted["KPConv, gathering"] += sum(map(len, influence.support)) * dim_in
+        counted["KPConv, gathering"] += sum(len(bags.index) for bags in influence.bags) * dim_in
         counted["KPConv, products"] += len(neighbors) * n_kernel * dim_in * dim_out
-        counted["KPConv, influences"] += int((neighbors < influence.n_supports).sum()) * n_kernel * 4
+        counted["KPConv, influences"] += int((neighbors < influence.bags[0].n_rows).sum()) * n_kernel * 4
 
     def image(_: nn.Module, args: tuple[Any, ...], out: torch.Tensor) -> None:
         assert isinstance(module, nn.Conv2d)
@@ -52,9 +52,8 @@ def _counter(counted: Counter[str], module: nn.Module) -> Any:
 
     def structure(_: nn.Module, args: tuple[Any, ...], out: torch.Tensor) -> None:
         assert isinstance(module, StructureEmbedding)
-        # one product for the distance of each pair and one for each of its angles
-        products = 1 + min(module.angle_k, out.shape[0] - 1)
-        counted["structure embedding"] += out.numel() * module.distance.in_features * products
+        # four samples of its curve for the distance of each pair and for each of its angles
+        counted["structure embedding"] += out.numel() * 4 * (1 + min(module.angle_k, out.shape[0] - 1))
 
     by_kind = {StructureEmbedding: structure, nn.Linear: linear, kpconv.KPConv: convolution, nn.Conv2d: image}
     return by_kind.get(type(module), lambda *_: None)  # type: ignore[call-overload]

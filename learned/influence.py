@@ -3,13 +3,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 import torch
-from scipy.sparse import csr_array
 from torch import Tensor
+
+from hybridreg.learned.bags import Bags
 
 
 @dataclass(frozen=True)
@@ -36,41 +37,27 @@ def find_links(queries: Tensor, supports: Tensor, neighbors: Tensor) -> Links:
 
 @dataclass(frozen=True)
 class Influence:
-    """The non-zero influences of a layer, kernel point after kernel point, one bag for each query.
+    """The non-zero influences of a layer: for each kernel point, one bag of supports a query.
 
     Only about a tenth of all (kernel point, query, neighbour) triples lie within the kernel points' reach:
     the sparse form does a tenth of the multiplications of the dense one.
     """
 
-    n_supports: int
-    support: tuple[Tensor, ...]  # of each kernel point: (E_k,) int64
-    weight: tuple[Tensor, ...]  # (E_k,) in (0, 1]
-    offsets: tuple[Tensor, ...]  # (N,) int64: where the bag of each query begins
+    bags: tuple[Bags, ...]  # of each kernel point: (N, M)
 
     @cached_property
-    def transposed(self) -> tuple[Tensor, Tensor, Tensor]:
-        """By support: ``query * K + kernel point`` (E,), weight (E,), and where each support begins (M,)."""
-        n_kernel, n = len(self.support), len(self.offsets[0])
-        starts, total = [], 0
-        for support, offsets in zip(self.support, self.offsets, strict=True):
-            starts.append(offsets + total)
-            total += len(support)
-        starts.append(starts[0].new_full((1,), total))
-        table = csr_array(
-            (
-                torch.cat(self.weight).numpy(force=True),
-                torch.cat(self.support).numpy(force=True),
-                torch.cat(starts).numpy(force=True),
-            ),
-            shape=(n_kernel * n, self.n_supports),
-        ).tocsc()
-        device = starts[0].device
-        bag = torch.from_numpy(table.indices.astype(np.int64)).to(device)
-        return (
-            bag % n * n_kernel + bag.div(n, rounding_mode="floor"),
-            torch.from_numpy(table.data).to(device),
-            torch.from_numpy(table.indptr[:-1].astype(np.int64)).to(device),
-        )
+    def transposed(self) -> Bags:
+        """All kernel points by support: (M, N * K), row ``query * K + kernel point``."""
+        n_kernel, n = len(self.bags), len(self.bags[0].offsets)
+        lengths = torch.tensor([0, *(len(bag.index) for bag in self.bags[:-1])]).cumsum(0).tolist()
+        flipped = Bags(
+            torch.cat([bag.index for bag in self.bags]),
+            torch.cat([bag.weight for bag in self.bags]),
+            torch.cat([bag.offsets + start for bag, start in zip(self.bags, lengths, strict=True)]),
+            self.bags[0].n_rows,
+        ).transposed
+        row = flipped.index % n * n_kernel + flipped.index.div(n, rounding_mode="floor")
+        return replace(flipped, index=row)
 
 
 def kernel_influence(links: Links, kernel: Tensor, sigma: float) -> Influence:
@@ -93,16 +80,16 @@ def kernel_influence(links: Links, kernel: Tensor, sigma: float) -> Influence:
         _reached(links, factor, float(constant), sigma)
         for factor, constant in zip(factors, constants, strict=True)
     ]
-    support, weight, offsets = zip(*parts, strict=True)
-    return Influence(links.n_supports, support, weight, offsets)
+    return Influence(tuple(parts))
 
 
-def _reached(links: Links, factor: Tensor, constant: float, sigma: float) -> tuple[Tensor, Tensor, Tensor]:
+def _reached(links: Links, factor: Tensor, constant: float, sigma: float) -> Bags:
     squared = factor @ links.local
     entry = _positions(squared, sigma**2 - constant)
     distance = (squared.index_select(0, entry) + constant).clamp_min_(0.0).sqrt_()
     counts = torch.bincount(links.query.index_select(0, entry), minlength=links.n_queries)
-    return links.support.index_select(0, entry), 1.0 - distance / sigma, counts.cumsum(0) - counts
+    support = links.support.index_select(0, entry)
+    return Bags(support, 1.0 - distance / sigma, counts.cumsum(0) - counts, links.n_supports)
 
 
 def _positions(values: Tensor, limit: float) -> Tensor:

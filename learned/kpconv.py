@@ -49,32 +49,28 @@ class _WeightedSums(torch.autograd.Function):
     @staticmethod
     def forward(ctx: Any, features: Tensor, weights: Tensor, influence: Influence) -> Tensor:
         ctx.influence = influence
-        bags = []
-        out = features.new_zeros(len(influence.offsets[0]), weights.shape[2])
-        for k, weight in enumerate(weights):
-            bag = _weighted_bags(features, influence.support[k], influence.weight[k], influence.offsets[k])
-            out.addmm_(bag, weight)
+        kept = []
+        out = features.new_zeros(len(influence.bags[0].offsets), weights.shape[2])
+        for bags, weight in zip(influence.bags, weights, strict=True):
+            gathered = bags.sum_detached(features)
+            out.addmm_(gathered, weight)
             if ctx.needs_input_grad[1]:
-                bags.append(bag)
-        ctx.save_for_backward(weights, *bags)
+                kept.append(gathered)
+        ctx.save_for_backward(weights, *kept)
         return out
 
     @staticmethod
     def backward(ctx: Any, gradient: Tensor) -> tuple[Tensor | None, Tensor | None, None]:
-        weights, *bags = ctx.saved_tensors
+        weights, *kept = ctx.saved_tensors
         of_features = of_weights = None
         if ctx.needs_input_grad[0]:
-            # torch's own gradient sorts the gathered rows anew each time; here they are sorted once
+            # all kernel points in one product and one sum
             n_kernel, dim_in, dim_out = weights.shape
             flat = gradient @ weights.view(n_kernel * dim_in, dim_out).t()
-            of_features = _weighted_bags(flat.view(-1, dim_in), *ctx.influence.transposed)
+            of_features = ctx.influence.transposed.sum_detached(flat.view(-1, dim_in))
         if ctx.needs_input_grad[1]:
-            of_weights = torch.stack([bag.t() @ gradient for bag in bags])
+            of_weights = torch.stack([gathered.t() @ gradient for gathered in kept])
         return of_features, of_weights, None
-
-
-def _weighted_bags(features: Tensor, index: Tensor, weight: Tensor, offsets: Tensor) -> Tensor:
-    return F.embedding_bag(index, features, offsets, mode="sum", per_sample_weights=weight)
 
 
 def _positive_neighbors(features: Tensor, neighbors: Tensor) -> Tensor:
