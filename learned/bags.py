@@ -45,9 +45,7 @@ class Bags:
 
     def sum_detached(self, rows: Tensor) -> Tensor:
         """The same outside of any graph."""
-        return F.embedding_bag(
-            self.index, rows, self.offsets, mode="sum", per_sample_weights=self.weight
-        )
+        return F.embedding_bag(self.index, rows, self.offsets, mode="sum", per_sample_weights=self.weight)
 
 
 class _Sum(torch.autograd.Function):

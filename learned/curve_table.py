@@ -25,7 +25,10 @@ def interpolate(samples: Tensor, values: Tensor) -> Tensor:
     t = steps - cell
     index = cell.long()[:, None] + torch.arange(4, device=values.device)
     bags = Bags(
-        index.flatten(), _cubic_weights(t).flatten(), torch.arange(0, index.numel(), 4, device=index.device), len(samples)
+        index.flatten(),
+        _cubic_weights(t).flatten(),
+        torch.arange(0, index.numel(), 4, device=index.device),
+        len(samples),
     )
     return bags.sum(samples).view(*values.shape, -1)
 

@@ -40,12 +40,12 @@ class _GroupNorm(torch.autograd.Function):
     def backward(ctx: Any, gradient: Tensor) -> tuple[Tensor, Tensor, Tensor, None, None]:
         features, weight, mean, inverse, out = ctx.saved_tensors
         if ctx.slope != 1.0:
-            gradient = torch.where(out > 0, gradient, gradient * ctx.slope)
+            gradient = torch.ops.aten.leaky_relu_backward(gradient, out, ctx.slope, True)
         of_bias = gradient.sum(0)
         # of x_hat = (x - mean) * inverse, by channel
-        of_weight = (_products(gradient, features) - mean * of_bias) * inverse
-        by_mean = _group_mean(weight * of_bias, ctx.groups) / max(1, len(features))
-        by_spread = _group_mean(weight * of_weight, ctx.groups) / max(1, len(features)) * inverse
+        of_weight = ((gradient * features).sum(0) - mean * of_bias) * inverse
+        by_mean = _group_mean(weight * of_bias, ctx.groups) / len(features)
+        by_spread = _group_mean(weight * of_weight, ctx.groups) / len(features) * inverse
         # dx = inverse * (weight * g - by_mean - x_hat * spread)
         of_features = torch.addcmul(inverse * (mean * by_spread - by_mean), features, -inverse * by_spread)
         return of_features.addcmul_(gradient, inverse * weight), of_weight, of_bias, None, None
@@ -53,6 +53,7 @@ class _GroupNorm(torch.autograd.Function):
 
 def _statistics(features: Tensor, groups: int) -> tuple[Tensor, Tensor]:
     """Mean and inverse deviation of each channel's group, (C,) both."""
+    # torch's batch_norm_update_stats is three times as fast, but sums row after row: 2e-4 off on 12,000 rows
     mean = features.mean(0)
     variance = (features - mean).square_().mean(0)
     group_mean = _group_mean(mean, groups)
@@ -63,7 +64,3 @@ def _statistics(features: Tensor, groups: int) -> tuple[Tensor, Tensor]:
 def _group_mean(values: Tensor, groups: int) -> Tensor:
     grouped = values.view(groups, -1)
     return grouped.mean(1, keepdim=True).expand_as(grouped).flatten()
-
-
-def _products(first: Tensor, second: Tensor) -> Tensor:
-    return (first * second).sum(0)

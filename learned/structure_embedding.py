@@ -38,7 +38,10 @@ class StructureEmbedding(nn.Module):
         k = min(self.angle_k, len(points) - 1)
         nearest = distance.topk(k + 1, largest=False)[1][:, 1:]  # (n, k)
         distance = distance / self.sigma_d
-        curves = (self._curve(self.distance, float(distance.max())), self._curve(self.angle, math.pi * self.angle_scale))
+        curves = (
+            self._curve(self.distance, float(distance.max())),
+            self._curve(self.angle, math.pi * self.angle_scale),
+        )
         rows = max(1, _CHUNK_VALUES // (len(points) * max(k, 1) * self.distance.in_features))
         blocks = torch.arange(len(points), device=points.device).split(rows)
         return torch.cat([self._rows(points, distance[b], nearest[b], b, curves) for b in blocks])

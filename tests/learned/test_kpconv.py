@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hybridreg.learned.blocks import PointGroupNorm, upsample
+from hybridreg.learned.group_norm import group_norm
 from hybridreg.learned.influence import find_links, kernel_influence
 from hybridreg.learned.kernel_points import kernel_points
 from hybridreg.learned.kpconv import kernel_point_convolution
@@ -92,6 +93,14 @@ def test_group_norm_equals_torch(n: int) -> None:
     got = norm(features, (n, 0))
     assert got.shape == (n, 12)
     assert torch.allclose(got, want, atol=2e-4)
+
+
+@pytest.mark.parametrize("slope", [1.0, 0.1])
+def test_group_norm_gradients(slope: float) -> None:
+    gen = torch.Generator().manual_seed(0)
+    values = [torch.randn(shape, dtype=torch.float64, generator=gen) for shape in ((7, 6), (6,), (6,))]
+    inputs = [value.requires_grad_() for value in values]
+    assert torch.autograd.gradcheck(lambda f, w, b: group_norm(f + 5, w, b, 2, slope), inputs)
 
 
 def test_per_cloud_norm_ignores_the_other_cloud() -> None:
