@@ -40,14 +40,11 @@ def _counter(counted: Counter[str], module: nn.Module) -> Any:
 
     def convolution(_: nn.Module, args: tuple[Any, ...], out: torch.Tensor) -> None:
         assert isinstance(module, kpconv.KPConv)
-        _, queries, supports, neighbors = args[:4]
-        influence = args[4] or kpconv.kernel_influence(
-            queries, supports, neighbors, module.kernel, module.sigma
-        )
+        _, neighbors, influence = args
         n_kernel, dim_in, dim_out = module.weights.shape
-        counted["KPConv, gathering"] += len(influence.index) * dim_in
-        counted["KPConv, products"] += len(queries) * n_kernel * dim_in * dim_out
-        counted["KPConv, influences"] += neighbors.numel() * n_kernel * 3
+        counted["KPConv, gathering"] += sum(len(bags.index) for bags in influence.bags) * dim_in
+        counted["KPConv, products"] += len(neighbors) * n_kernel * dim_in * dim_out
+        counted["KPConv, influences"] += int((neighbors < influence.bags[0].n_rows).sum()) * n_kernel * 4
 
     def image(_: nn.Module, args: tuple[Any, ...], out: torch.Tensor) -> None:
         assert isinstance(module, nn.Conv2d)
@@ -55,9 +52,8 @@ def _counter(counted: Counter[str], module: nn.Module) -> Any:
 
     def structure(_: nn.Module, args: tuple[Any, ...], out: torch.Tensor) -> None:
         assert isinstance(module, StructureEmbedding)
-        # one product for the distance of each pair and one for each of its angles
-        products = 1 + min(module.angle_k, out.shape[0] - 1)
-        counted["structure embedding"] += out.numel() * module.distance.in_features * products
+        # four samples of its curve for the distance of each pair and for each of its angles
+        counted["structure embedding"] += out.numel() * 4 * (1 + min(module.angle_k, out.shape[0] - 1))
 
     by_kind = {StructureEmbedding: structure, nn.Linear: linear, kpconv.KPConv: convolution, nn.Conv2d: image}
     return by_kind.get(type(module), lambda *_: None)  # type: ignore[call-overload]

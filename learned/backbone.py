@@ -11,7 +11,7 @@ from torch import Tensor, nn
 
 from hybridreg.learned.blocks import BlockPlan, ConvBlock, ResidualBlock, Surroundings, Unary, upsample
 from hybridreg.learned.config import BackboneConfig
-from hybridreg.learned.kpconv import kernel_influence
+from hybridreg.learned.influence import find_links
 from hybridreg.learned.pyramid import Pyramid
 
 
@@ -104,22 +104,20 @@ def _block(plan: BlockPlan, first: bool, rng: np.random.Generator | None) -> nn.
 
 
 def _plain(pyramid: Pyramid, stage: int) -> Surroundings:
-    points, lengths = pyramid.points[stage], pyramid.lengths[stage]
-    return Surroundings(points, points, pyramid.neighbors[stage], lengths, lengths)
+    points, lengths, neighbors = pyramid.points[stage], pyramid.lengths[stage], pyramid.neighbors[stage]
+    return Surroundings(neighbors, lengths, lengths, find_links(points, points, neighbors))
 
 
 def _strided(pyramid: Pyramid, stage: int) -> Surroundings:
+    neighbors = pyramid.subsampling[stage - 1]
     return Surroundings(
-        queries=pyramid.points[stage],
-        supports=pyramid.points[stage - 1],
-        neighbors=pyramid.subsampling[stage - 1],
+        neighbors,
         lengths=pyramid.lengths[stage],
         support_lengths=pyramid.lengths[stage - 1],
+        links=find_links(pyramid.points[stage], pyramid.points[stage - 1], neighbors),
     )
 
 
 def _with_influence(around: Surroundings, block: nn.Module) -> Surroundings:
     assert isinstance(block, ConvBlock | ResidualBlock)
-    conv = block.conv
-    influence = kernel_influence(around.queries, around.supports, around.neighbors, conv.kernel, conv.sigma)
-    return replace(around, influence=influence)
+    return replace(around, influence=around.influence_of(block.conv))

@@ -10,23 +10,27 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional as F
 
-from hybridreg.learned.kpconv import Influence, KPConv
+from hybridreg.learned.group_norm import group_norm
+from hybridreg.learned.influence import Influence, Links, kernel_influence
+from hybridreg.learned.kpconv import KPConv
 from hybridreg.learned.max_pool import max_pool
 
 _SLOPE = 0.1
-_EPS = 1e-5
 
 
 @dataclass(frozen=True)
 class Surroundings:
     """What a block needs to know of the geometry: where it computes, from where, and through which links."""
 
-    queries: Tensor  # (N, 3)
-    supports: Tensor  # (M, 3)
     neighbors: Tensor  # (N, k) into the supports, pad M
     lengths: tuple[int, int]  # queries of the target, of the source
     support_lengths: tuple[int, int]
-    influence: Influence | None = None
+    links: Links
+    influence: Influence | None = None  # where the layers share their kernel points
+
+    def influence_of(self, conv: KPConv) -> Influence:
+        """Influences of the neighbours on a layer's kernel points."""
+        return self.influence or kernel_influence(self.links, conv.kernel, conv.sigma)
 
 
 class PointGroupNorm(nn.Module):
@@ -38,25 +42,11 @@ class PointGroupNorm(nn.Module):
         self.weight = nn.Parameter(torch.ones(dim))
         self.bias = nn.Parameter(torch.zeros(dim))
 
-    def forward(self, features: Tensor, lengths: tuple[int, int]) -> Tensor:
-        """(N, C) to (N, C); ``lengths`` splits the rows into target and source."""
-        if not self.per_cloud:
-            return self._normalize(features)
-        return torch.cat([self._normalize(cloud) for cloud in features.split(list(lengths))])
-
-    def _normalize(self, features: Tensor) -> Tensor:
-        # By channel first, then over the channels of a group: the rows stay where they are, while
-        # torch's group_norm would want them transposed and back.
-        mean = features.mean(0)
-        variance = (features - mean).square().mean(0)
-        grouped = mean.view(self.groups, -1)
-        group_mean = grouped.mean(1, keepdim=True)
-        group_variance = (variance.view(self.groups, -1) + (grouped - group_mean).square()).mean(
-            1, keepdim=True
-        )
-        scale = (group_variance + _EPS).rsqrt().expand_as(grouped).flatten() * self.weight
-        shift = self.bias - group_mean.expand_as(grouped).flatten() * scale
-        return torch.addcmul(shift, features, scale)
+    def forward(self, features: Tensor, lengths: tuple[int, int], slope: float = 1.0) -> Tensor:
+        """(N, C) to (N, C); ``lengths`` splits the rows into target and source, ``slope`` is a LeakyReLU's."""
+        parts = features.split(list(lengths)) if self.per_cloud else [features]
+        done = [group_norm(part, self.weight, self.bias, self.groups, slope) for part in parts]
+        return done[0] if len(done) == 1 else torch.cat(done)
 
 
 class Unary(nn.Module):
@@ -72,8 +62,7 @@ class Unary(nn.Module):
 
     def forward(self, features: Tensor, lengths: tuple[int, int]) -> Tensor:
         """(N, C_in) to (N, C_out)."""
-        features = self.norm(self.linear(features), lengths)
-        return F.leaky_relu_(features, _SLOPE) if self.activate else features
+        return self.norm(self.linear(features), lengths, _SLOPE if self.activate else 1.0)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -100,8 +89,8 @@ class ConvBlock(nn.Module):
 
     def forward(self, features: Tensor, around: Surroundings) -> Tensor:
         """(M, C_in) to (N, C_out)."""
-        features = self.conv(features, around.queries, around.supports, around.neighbors, around.influence)
-        return F.leaky_relu_(self.norm(features, around.lengths), _SLOPE)
+        features = self.conv(features, around.neighbors, around.influence_of(self.conv))
+        return self.norm(features, around.lengths, _SLOPE)
 
 
 class ResidualBlock(nn.Module):
@@ -124,8 +113,8 @@ class ResidualBlock(nn.Module):
     def forward(self, features: Tensor, around: Surroundings) -> Tensor:
         """(M, C_in) to (N, C_out)."""
         main = features if self.unary_in is None else self.unary_in(features, around.support_lengths)
-        main = self.conv(main, around.queries, around.supports, around.neighbors, around.influence)
-        main = self.unary_out(F.leaky_relu_(self.norm(main, around.lengths), _SLOPE), around.lengths)
+        main = self.conv(main, around.neighbors, around.influence_of(self.conv))
+        main = self.unary_out(self.norm(main, around.lengths, _SLOPE), around.lengths)
         shortcut = max_pool(features, around.neighbors) if self.strided else features
         if self.unary_shortcut is not None:
             shortcut = self.unary_shortcut(shortcut, around.lengths)

@@ -7,10 +7,10 @@ import math
 
 import torch
 from torch import Tensor, nn
-from torch.nn import functional as F
 
+from hybridreg.learned.curve_table import interpolate, sample_positions
 from hybridreg.learned.distances import squared_distances
-from hybridreg.learned.positions import frequencies
+from hybridreg.learned.positions import frequencies, sinusoids
 
 # Values of the (rows, n, k, d) angle tensor computed in one go: 16 MB, whatever the number of superpoints.
 _CHUNK_VALUES = 2**22
@@ -37,24 +37,27 @@ class StructureEmbedding(nn.Module):
         distance = squared_distances(points, points).sqrt()  # (n, n)
         k = min(self.angle_k, len(points) - 1)
         nearest = distance.topk(k + 1, largest=False)[1][:, 1:]  # (n, k)
+        distance = distance / self.sigma_d
+        curves = (
+            self._curve(self.distance, float(distance.max())),
+            self._curve(self.angle, math.pi * self.angle_scale),
+        )
         rows = max(1, _CHUNK_VALUES // (len(points) * max(k, 1) * self.distance.in_features))
         blocks = torch.arange(len(points), device=points.device).split(rows)
-        return torch.cat([self._rows(points, distance[block], nearest[block], block) for block in blocks])
+        return torch.cat([self._rows(points, distance[b], nearest[b], b, curves) for b in blocks])
 
-    def _rows(self, points: Tensor, distance: Tensor, nearest: Tensor, block: Tensor) -> Tensor:
-        embedding = self._embed(self.distance, distance / self.sigma_d)  # (b, n, d)
+    def _rows(
+        self, points: Tensor, distance: Tensor, nearest: Tensor, block: Tensor, curves: tuple[Tensor, Tensor]
+    ) -> Tensor:
+        embedding = interpolate(curves[0], distance)  # (b, n, d)
         if nearest.shape[1] == 0:  # a single superpoint spans no angle
             return embedding
         angles = neighbor_angles(points[block], points, points[nearest]) * self.angle_scale  # (b, n, k)
-        return embedding.add_(self._embed(self.angle, angles).amax(2))
+        return embedding.add_(interpolate(curves[1], angles).amax(2))
 
-    def _embed(self, layer: nn.Linear, values: Tensor) -> Tensor:
-        # The layer's columns are sorted to take all sines, then all cosines, instead of interleaving the
-        # values.
-        half = len(self.frequency)
-        weight = layer.weight.view(-1, half, 2).transpose(1, 2).reshape(-1, 2 * half)
-        omega = values[..., None] * self.frequency
-        return F.linear(torch.cat([omega.sin(), omega.cos()], dim=-1), weight, layer.bias)
+    def _curve(self, layer: nn.Linear, highest: float) -> Tensor:
+        """Samples of the embedding of a number: n^2 (k + 1) sines and products would say no more."""
+        return layer(sinusoids(sample_positions(highest, self.frequency), self.frequency))
 
 
 def neighbor_angles(anchors: Tensor, points: Tensor, nearest: Tensor) -> Tensor:

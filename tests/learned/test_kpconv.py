@@ -9,10 +9,11 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hybridreg.learned import kpconv
 from hybridreg.learned.blocks import PointGroupNorm, upsample
+from hybridreg.learned.group_norm import group_norm
+from hybridreg.learned.influence import find_links, kernel_influence
 from hybridreg.learned.kernel_points import kernel_points
-from hybridreg.learned.kpconv import kernel_influence, kernel_point_convolution
+from hybridreg.learned.kpconv import kernel_point_convolution
 from hybridreg.learned.max_pool import max_pool
 
 
@@ -31,9 +32,7 @@ def by_loops(queries, supports, neighbors, kernel, sigma, features, weights, bia
     return out + bias
 
 
-@pytest.mark.parametrize("chunk", [7, 2**18])
-def test_equals_a_triple_loop(monkeypatch: pytest.MonkeyPatch, chunk: int) -> None:
-    monkeypatch.setattr(kpconv, "_CHUNK_ENTRIES", chunk * 15 * 6)
+def test_equals_a_triple_loop() -> None:
     gen = torch.Generator().manual_seed(0)
     supports = torch.rand(20, 3, dtype=torch.float64, generator=gen)
     queries = torch.rand(11, 3, dtype=torch.float64, generator=gen)
@@ -43,27 +42,30 @@ def test_equals_a_triple_loop(monkeypatch: pytest.MonkeyPatch, chunk: int) -> No
     weights = torch.randn(15, 4, 5, dtype=torch.float64, generator=gen)
     bias = torch.randn(5, dtype=torch.float64, generator=gen)
     kernel = torch.from_numpy(kernel_points(15, 0.8)).double()
-    influence = kernel_influence(queries, supports, neighbors, kernel, 0.4)
+    influence = kernel_influence(find_links(queries, supports, neighbors), kernel, 0.4)
     got = kernel_point_convolution(features, neighbors, influence, weights, bias)
     want = by_loops(queries, supports, neighbors, kernel, 0.4, features, weights, bias)
     assert torch.allclose(got, want, atol=1e-10, rtol=0)
     assert torch.equal(got[3], bias)
 
 
-def test_gradients_reach_features_and_weights() -> None:
+@pytest.mark.parametrize("sigma", [0.5, 1e-6])  # the second reaches nothing
+def test_gradients_reach_features_and_weights(sigma: float) -> None:
     gen = torch.Generator().manual_seed(1)
-    points = torch.rand(9, 3, dtype=torch.float64, generator=gen)
-    neighbors = torch.randint(0, 10, (9, 4), generator=gen)
+    supports = torch.rand(9, 3, dtype=torch.float64, generator=gen)
+    queries = torch.rand(6, 3, dtype=torch.float64, generator=gen)
+    neighbors = torch.randint(0, 10, (6, 4), generator=gen)
+    neighbors[2] = 9
     features = torch.rand(9, 3, dtype=torch.float64, generator=gen, requires_grad=True)
     weights = torch.randn(15, 3, 2, dtype=torch.float64, generator=gen, requires_grad=True)
-    influence = kernel_influence(
-        points, points, neighbors, torch.from_numpy(kernel_points(15, 0.8)).double(), 0.5
-    )
+    bias = torch.randn(2, dtype=torch.float64, generator=gen, requires_grad=True)
+    kernel = torch.from_numpy(kernel_points(15, 0.8)).double()
+    influence = kernel_influence(find_links(queries, supports, neighbors), kernel, sigma)
 
-    def convolve(f: torch.Tensor, w: torch.Tensor) -> torch.Tensor:
-        return kernel_point_convolution(f, neighbors, influence, w, None)
+    def convolve(f: torch.Tensor, w: torch.Tensor, b: torch.Tensor) -> torch.Tensor:
+        return kernel_point_convolution(f, neighbors, influence, w, b)
 
-    assert torch.autograd.gradcheck(convolve, (features, weights))
+    assert torch.autograd.gradcheck(convolve, (features, weights, bias))
 
 
 @settings(max_examples=25, deadline=None)
@@ -91,6 +93,14 @@ def test_group_norm_equals_torch(n: int) -> None:
     got = norm(features, (n, 0))
     assert got.shape == (n, 12)
     assert torch.allclose(got, want, atol=2e-4)
+
+
+@pytest.mark.parametrize("slope", [1.0, 0.1])
+def test_group_norm_gradients(slope: float) -> None:
+    gen = torch.Generator().manual_seed(0)
+    values = [torch.randn(shape, dtype=torch.float64, generator=gen) for shape in ((7, 6), (6,), (6,))]
+    inputs = [value.requires_grad_() for value in values]
+    assert torch.autograd.gradcheck(lambda f, w, b: group_norm(f + 5, w, b, 2, slope), inputs)
 
 
 def test_per_cloud_norm_ignores_the_other_cloud() -> None:
