@@ -23,9 +23,20 @@ def pick(rows: np.ndarray, index: np.ndarray) -> np.ndarray:
     return np.asarray(rows.T.take(index, axis=1, mode="wrap").T)
 
 
+def put(rows: np.ndarray, index: np.ndarray, values: np.ndarray) -> None:
+    """`rows[index] = values`."""
+    for column, value in zip(rows.T, values.T, strict=True):
+        column[index] = value
+
+
 def turned(rows: np.ndarray, rotation: np.ndarray) -> np.ndarray:
     """`rows` (n,3) turned by `rotation` (3,3)."""
     return np.asarray((rotation.astype(rows.dtype) @ rows.T).T)
+
+
+def outer(values: np.ndarray, row: np.ndarray) -> np.ndarray:
+    """`row` (3,) times each of `values` (n,), as rows (n,3)."""
+    return np.multiply.outer(row, values).T
 
 
 def dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
