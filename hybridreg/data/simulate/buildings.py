@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from hybridreg.data.simulate.chance import one
 from hybridreg.data.simulate.mesh import Mesh, Tint
 from hybridreg.data.simulate.solids import boxes, loft, quads
 
@@ -38,7 +39,7 @@ class Style:
     @staticmethod
     def draw(rng: np.random.Generator) -> Style:
         """A building as towns have them."""
-        material = str(rng.choice(["plaster", "brick", "concrete"], p=[0.5, 0.3, 0.2]))
+        material = one(rng, ("plaster", "brick", "concrete"), (0.5, 0.3, 0.2))
         tint = np.array(_WALL_TINTS[rng.integers(len(_WALL_TINTS))]) * rng.uniform(0.8, 1.1)
         return Style(
             material,
@@ -47,7 +48,7 @@ class Style:
             rng.uniform(2.8, 3.8),
             (rng.uniform(0.3, 0.75), rng.uniform(0.4, 0.65)),
             rng.uniform(0.08, 0.4),
-            float(rng.choice([0.0, 0.0, rng.uniform(0.15, 0.5)])),
+            one(rng, (0.0, 0.0, rng.uniform(0.15, 0.5))),
             bool(rng.random() < 0.3),
             bool(rng.random() < 0.4),
         )
@@ -58,7 +59,7 @@ def _cells(style: Style, length: float, height: float, rng: np.random.Generator)
     across, up = max(1, round(length / style.cell)), max(1, round(height / style.storey))
     u = np.linspace(0, length, across + 1)
     z = np.linspace(0, height, up + 1)
-    left, bottom = (g.ravel() for g in np.meshgrid(u[:-1], z[:-1], indexing="ij"))
+    left, bottom = np.repeat(u[:-1], up), np.tile(z[:-1], across)
     width, storey = length / across, height / up
     ground = bottom < 0.1
     share_u = np.where(ground & style.shop, 0.85, style.window[0]) * np.where(
@@ -141,21 +142,21 @@ def _relief(
     if with_balcony.any():
         u = ((w0 + w1) / 2)[with_balcony]
         xy = start + u[:, None] * along + 0.6 * out
-        foot = np.c_[xy, base + sill[with_balcony] - 0.3]
+        foot = np.column_stack([xy, base + sill[with_balcony] - 0.3])
         parts.append(boxes(foot, np.array([style.cell * 0.8, 1.2, 0.15]), yaw, "concrete", dark))
-        rail = np.c_[xy + 0.55 * out, foot[:, 2] + 0.15]
+        rail = np.column_stack([xy + 0.55 * out, foot[:, 2] + 0.15])
         parts.append(boxes(rail, np.array([style.cell * 0.8, 0.06, 0.9]), yaw, "metal", (0.35, 0.35, 0.37)))
     if style.pillars:
         u = np.linspace(0.3, length - 0.3, max(2, int(length / (2 * style.cell))))
         xy = start + u[:, None] * along + 0.15 * out
         parts.append(
-            boxes(np.c_[xy, np.full(len(u), base)], np.array([0.5, 0.35, height]), yaw, "concrete", dark)
+            boxes(np.column_stack([xy, np.full(len(u), base)]), np.array([0.5, 0.35, height]), yaw, "concrete", dark)
         )
     middle = start + 0.5 * length * along + 0.12 * out
     ledges = base + np.array([min(style.storey, height * 0.5), height - 0.35])
     parts.append(
         boxes(
-            np.c_[np.tile(middle, (2, 1)), ledges], np.array([length, 0.3, 0.25]), yaw, style.material, dark
+            np.array([[*middle, ledges[0]], [*middle, ledges[1]]]), np.array([length, 0.3, 0.25]), yaw, style.material, dark
         )
     )
     return parts
@@ -184,7 +185,7 @@ def building(
 
 
 def _roof(corners: np.ndarray, top: float, style: Style, rng: np.random.Generator) -> list[Mesh]:
-    flat = np.c_[corners, np.full(4, top)]
+    flat = np.column_stack([corners, np.full(4, top)])
     parts = [quads(flat[None], "concrete", (0.4, 0.4, 0.4))]
     if rng.random() < 0.5:
         rise = rng.uniform(1.5, 4.0)

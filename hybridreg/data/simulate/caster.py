@@ -72,7 +72,8 @@ class Open3dCaster:
         self._tensor = open3d.core.Tensor
         # Embree's own threads would fight over the cores with the other workers.
         self._scene = open3d.t.geometry.RaycastingScene(nthreads=1)
-        self._scene.add_triangles(self._tensor(mesh.vertices), self._tensor(mesh.faces.astype(np.uint32)))
+        vertices, faces = np.ascontiguousarray(mesh.vertices), mesh.faces.astype(np.uint32)
+        self._scene.add_triangles(self._tensor(vertices), self._tensor(faces))
 
     def cast(self, rays: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """See `Caster.cast`."""
