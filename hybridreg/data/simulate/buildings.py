@@ -8,6 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from hybridreg.data.simulate.chance import one
+from hybridreg.data.simulate.columns import stack
+from hybridreg.data.simulate.materials import MATERIAL_INDEX
 from hybridreg.data.simulate.mesh import Mesh, Tint
 from hybridreg.data.simulate.solids import boxes, loft, quads
 
@@ -89,38 +91,34 @@ def facade(
     out = np.array([along[1], -along[0]])
     length = float(np.linalg.norm(end - start))
     u0, u1, z0, z1, w0, w1, s0, s1 = _cells(style, length, height, rng)
-
-    def corners(a: np.ndarray, b: np.ndarray, c: np.ndarray, d: np.ndarray, depth: float) -> np.ndarray:
-        u, z = np.stack([a, b, b, a]), np.stack([c, c, d, d])
-        x, y = start - depth * out
-        return np.stack([x + along[0] * u, y + along[1] * u, base + z])  # (3,4,n)
-
-    points = np.concatenate(
-        [corners(u0, u1, z0, z1, 0), corners(w0, w1, s0, s1, 0), corners(w0, w1, s0, s1, style.recess)], 1
-    )
-    stride = np.arange(0, 12 * len(u0), 12, dtype=np.int32)[:, None, None]
-    vertices = points.T.reshape(-1, 3).astype(np.float32)
-    pane_tint = np.array([0.25, 0.29, 0.33]) * rng.uniform(0.6, 1.3)
-    parts = [
-        Mesh.of(vertices, (_STONE + stride).reshape(-1, 3), style.material, style.tint),
-        # Curtains and blinds: a third of the windows answer like plaster, the others like glass.
-        *_panes(vertices, (_PANE + stride), pane_tint, rng),
-    ]
+    u = np.stack([u0, u1, u1, u0, w0, w1, w1, w0, w0, w1, w1, w0], 1)  # (n,12), as _WALL, _REVEAL and _PANE count
+    z = np.stack([z0, z0, z1, z1, s0, s0, s1, s1, s0, s0, s1, s1], 1)
+    depth = np.repeat([0.0, style.recess], [8, 4])
+    vertices = stack(start[0] - depth * out[0] + along[0] * u, start[1] - depth * out[1] + along[1] * u, base + z)
+    parts = [_wall(vertices, style, rng)]
     parts += _relief(start, along, out, base, length, height, style, (w0, w1, s0), rng)
     return parts
 
 
-def _panes(vertices: np.ndarray, faces: np.ndarray, tint: np.ndarray, rng: np.random.Generator) -> list[Mesh]:
-    covered = rng.random(len(faces)) < 0.35
-    return [
-        Mesh.of(vertices, faces[~covered].reshape(-1, 3), "glass", tint),
-        Mesh.of(
-            vertices,
-            faces[covered].reshape(-1, 3),
-            "plaster",
-            (rng.uniform(0.55, 0.9) * np.array([1.0, 0.97, 0.92])),
-        ),
-    ]
+def _wall(vertices: np.ndarray, style: Style, rng: np.random.Generator) -> Mesh:
+    """Stone and panes over the corners (12n,3) of n window cells."""
+    glass = np.array([0.25, 0.29, 0.33]) * rng.uniform(0.6, 1.3)
+    stride = np.arange(0, len(vertices), 12, dtype=np.int32)[:, None, None]
+    # Curtains and blinds: a third of the windows answer like plaster, the others like glass.
+    covered = rng.random(len(stride)) < 0.35
+    curtain = rng.uniform(0.55, 0.9) * np.array([1.0, 0.97, 0.92])
+    kinds = (
+        (_STONE + stride, style.material, style.tint),
+        (_PANE + stride[~covered], "glass", glass),
+        (_PANE + stride[covered], "plaster", curtain),
+    )
+    counts = [faces.size // 3 for faces, _, _ in kinds]
+    return Mesh(
+        vertices,
+        np.concatenate([faces.reshape(-1, 3) for faces, _, _ in kinds]),
+        np.repeat(np.array([MATERIAL_INDEX[material] for _, material, _ in kinds], np.uint8), counts),
+        np.repeat(np.array([tint for _, _, tint in kinds], np.float32).T, counts, axis=1).T,
+    )
 
 
 def _relief(

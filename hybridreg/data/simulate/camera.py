@@ -120,9 +120,9 @@ def _develop(colour: np.ndarray, light: Light, rng: np.random.Generator) -> NDAr
     level = np.percentile(colour[::4, ::4].mean(-1), 65)
     gain = np.float32(0.45 / max(float(level), 1e-3) * light.exposure)
     v, u = np.linspace(-1, 1, UP, dtype=np.float32)[:, None], np.linspace(-1, 1, ACROSS, dtype=np.float32)
-    colour = (
-        colour * (gain * (1 - np.float32(light.vignette) * (u * u + v * v)))[..., None] * light.white_balance
-    )
+    shading = gain * (1 - np.float32(light.vignette) * (u * u + v * v))
+    colour *= np.repeat(shading, 3, axis=1).reshape(colour.shape)
+    colour *= np.tile(light.white_balance, ACROSS).reshape(ACROSS, 3)
     curve = np.sqrt(np.maximum(colour / (1 + np.float32(0.35) * colour), 0))
     curve += rng.standard_normal(colour.shape, dtype=np.float32) * np.float32(light.noise)
     small = (np.clip(curve, 0, 1) * 255).astype(np.uint8)

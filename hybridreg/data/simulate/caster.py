@@ -143,7 +143,7 @@ class World:
             face[nearer] = other[nearer] + first
         normal = pick(self._normal, face)  # a ray without a hit has face -1: its normal is never used
         normal *= np.copysign(np.float32(1), -dot(normal, directions))[:, None]
-        return Hits(distance, normal, self.material[face], face)
+        return Hits(distance, normal, self.material.take(face, mode="wrap"), face)
 
     def clear(self, origins: np.ndarray, segments: np.ndarray) -> NDArray[np.bool_]:
         """Whether nothing stands on the way (n,3) from `origins` (n,3) or (3,) to `origins + segments`."""

@@ -49,7 +49,8 @@ def overlap(
         return 0.0
     moved = source @ T_target_source[:3, :3].T + T_target_source[:3, 3]
     low, high = moved.min(axis=0) - radius, moved.max(axis=0) + radius
-    near = target[((target >= low) & (target <= high)).all(axis=1)]
+    inside = [(target[:, k] >= low[k]) & (target[:, k] <= high[k]) for k in range(3)]
+    near = target[inside[0] & inside[1] & inside[2]]
     # A tree that is not balanced is built three times as fast and asked nearly as fast.
     tree = cKDTree(near, balanced_tree=False, compact_nodes=False)
     distance, _ = tree.query(moved, distance_upper_bound=radius)
