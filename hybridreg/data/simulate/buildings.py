@@ -91,10 +91,14 @@ def facade(
     out = np.array([along[1], -along[0]])
     length = float(np.linalg.norm(end - start))
     u0, u1, z0, z1, w0, w1, s0, s1 = _cells(style, length, height, rng)
-    u = np.stack([u0, u1, u1, u0, w0, w1, w1, w0, w0, w1, w1, w0], 1)  # (n,12), as _WALL, _REVEAL and _PANE count
+    u = np.stack(
+        [u0, u1, u1, u0, w0, w1, w1, w0, w0, w1, w1, w0], 1
+    )  # (n,12), as _WALL, _REVEAL and _PANE count
     z = np.stack([z0, z0, z1, z1, s0, s0, s1, s1, s0, s0, s1, s1], 1)
     depth = np.repeat([0.0, style.recess], [8, 4])
-    vertices = stack(start[0] - depth * out[0] + along[0] * u, start[1] - depth * out[1] + along[1] * u, base + z)
+    vertices = stack(
+        start[0] - depth * out[0] + along[0] * u, start[1] - depth * out[1] + along[1] * u, base + z
+    )
     parts = [_wall(vertices, style, rng)]
     parts += _relief(start, along, out, base, length, height, style, (w0, w1, s0), rng)
     return parts
@@ -148,13 +152,23 @@ def _relief(
         u = np.linspace(0.3, length - 0.3, max(2, int(length / (2 * style.cell))))
         xy = start + u[:, None] * along + 0.15 * out
         parts.append(
-            boxes(np.column_stack([xy, np.full(len(u), base)]), np.array([0.5, 0.35, height]), yaw, "concrete", dark)
+            boxes(
+                np.column_stack([xy, np.full(len(u), base)]),
+                np.array([0.5, 0.35, height]),
+                yaw,
+                "concrete",
+                dark,
+            )
         )
     middle = start + 0.5 * length * along + 0.12 * out
     ledges = base + np.array([min(style.storey, height * 0.5), height - 0.35])
     parts.append(
         boxes(
-            np.array([[*middle, ledges[0]], [*middle, ledges[1]]]), np.array([length, 0.3, 0.25]), yaw, style.material, dark
+            np.array([[*middle, ledges[0]], [*middle, ledges[1]]]),
+            np.array([length, 0.3, 0.25]),
+            yaw,
+            style.material,
+            dark,
         )
     )
     return parts

@@ -126,7 +126,7 @@ class World:
 
     def __init__(self, parts: list[Part]) -> None:
         parts = [part for part in parts if len(part.mesh.faces)]
-        self._casters = [part.caster for part in parts]
+        self._parts = parts
         self._first = np.cumsum([0] + [len(part.mesh.faces) for part in parts[:-1]], dtype=np.int32)
         self._normal = np.concatenate([part.normals.T for part in parts], axis=1).T
         self.material = np.concatenate([part.mesh.material for part in parts])
@@ -135,9 +135,9 @@ class World:
     def cast(self, origins: np.ndarray, directions: np.ndarray) -> Hits:
         """First hits of rays from `origins` (n,3) or (3,) along unit `directions` (n,3)."""
         rays = _rays(origins, directions)
-        distance, face = self._casters[0].cast(rays)
-        for first, caster in zip(self._first[1:], self._casters[1:], strict=True):
-            t, other = caster.cast(rays)
+        distance, face = self._parts[0].caster.cast(rays)
+        for first, part in zip(self._first[1:], self._parts[1:], strict=True):
+            t, other = part.caster.cast(rays)
             nearer = np.flatnonzero(t < distance)
             distance[nearer] = t[nearer]
             face[nearer] = other[nearer] + first
@@ -148,10 +148,12 @@ class World:
     def clear(self, origins: np.ndarray, segments: np.ndarray) -> NDArray[np.bool_]:
         """Whether nothing stands on the way (n,3) from `origins` (n,3) or (3,) to `origins + segments`."""
         rays = _rays(origins, segments)
-        blocked = self._casters[0].blocked(rays)
-        for caster in self._casters[1:]:
-            blocked = blocked | caster.blocked(rays)
-        return ~blocked
+        clear = np.arange(len(rays))
+        for part in self._parts:
+            clear = clear[~part.caster.blocked(rays.take(clear, axis=0))]
+        result = np.zeros(len(rays), bool)
+        result[clear] = True
+        return result
 
 
 def _rays(origins: np.ndarray, directions: np.ndarray) -> NDArray[np.float32]:

@@ -13,7 +13,14 @@ from hybridreg.data.simulate.layout import Layout
 from hybridreg.data.simulate.materials import MATERIAL_INDEX
 from hybridreg.data.simulate.pool import one_of
 from hybridreg.data.simulate.scenes.backdrop import add_backdrop
-from hybridreg.data.simulate.scenes.scatter import add_car, add_people, in_box, plant_bushes, plant_trees, spot
+from hybridreg.data.simulate.scenes.scatter import (
+    add_car,
+    add_people,
+    in_box,
+    plant_bushes,
+    plant_trees,
+    spot,
+)
 
 
 def yard(rng: np.random.Generator) -> Layout:
