@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Time and memory of one forward pass by part: ``python benchmarks/forward.py --size full --points 6000``.
+"""Time and memory of one forward pass by part: ``python -m benchmarks.forward --size full --points 6000``.
 
 The pair is real where the data folder is there: the two clouds are cropped about the sensor until a 0.25 m
 grid holds the wanted number of points. Seconds are the median of the repeats, wall and processor; the
@@ -14,7 +14,6 @@ import argparse
 import os
 import resource
 import statistics
-import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -22,17 +21,15 @@ from pathlib import Path
 import numpy as np
 import torch
 
+from benchmarks.multiply_adds import count_multiply_adds
+from hybridreg.learned.batch import Batch, make_batch
+from hybridreg.learned.config import NetworkConfig
+from hybridreg.learned.grid import grid_subsample
+from hybridreg.learned.lgr import local_to_global
+from hybridreg.learned.network import RegistrationNetwork
+from hybridreg.learned.sizes import named_config
+
 ROOT = Path(__file__).resolve().parents[1]
-sys.path.insert(0, str(ROOT))
-
-from multiply_adds import count_multiply_adds  # noqa: E402
-
-from hybridreg.learned.batch import Batch, make_batch  # noqa: E402
-from hybridreg.learned.config import NetworkConfig  # noqa: E402
-from hybridreg.learned.grid import grid_subsample  # noqa: E402
-from hybridreg.learned.lgr import local_to_global  # noqa: E402
-from hybridreg.learned.network import RegistrationNetwork  # noqa: E402
-from hybridreg.learned.sizes import named_config  # noqa: E402
 
 
 def real_cloud(name: str) -> torch.Tensor:

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Makes the pair that ships in hybridreg/data/demo: a MEMS fan against a 64-beam spinning LiDAR.
 
-python benchmarks/simulator_demo.py
+python -m benchmarks.simulator_demo
 
 The pair that lies there was made by version 1 of the simulator; another version makes another pair.
 """
@@ -26,7 +26,7 @@ def main() -> None:
     )
     facts = {
         "id": pair_id(SPLIT, TIER, SEED, INDEX),
-        "made_by": "python benchmarks/simulator_demo.py",
+        "made_by": "python -m benchmarks.simulator_demo",
         "tier": TIER,
         "split": SPLIT,
         "seed": SEED,

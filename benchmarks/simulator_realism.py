@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Are simulated clouds like real ones? Prints the table of docs/simulator.md.
 
-python benchmarks/simulator_realism.py [--clouds 12] [--real ../shared/data/real]
+python -m benchmarks.simulator_realism [--clouds 12] [--real ../shared/data/real]
 
 Every figure is taken by the same code on the real clouds of one sensor model and on simulated clouds of that
 model, from the height of the real mount in the kinds of scene where the real ones were recorded.

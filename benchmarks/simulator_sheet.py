@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Contact sheet of simulated pairs: both clouds from above at the true pose, and the photograph.
 
-python benchmarks/simulator_sheet.py docs/simulator.png
+python -m benchmarks.simulator_sheet docs/simulator.png
 """
 
 from __future__ import annotations

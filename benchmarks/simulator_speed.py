@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Full simulated pairs a second (scene, two scans, photograph, overlap) and what one costs.
 
-python benchmarks/simulator_speed.py [--pairs 30] [--workers 1 2]
+python -m benchmarks.simulator_speed [--pairs 30] [--workers 1 2]
 
 Each worker first draws a few pairs that do not count: importing and filling the pools of trees and cars happens
 once, while a training run draws thousands. Pairs a second hang on what else the machine does, CPU seconds a pair

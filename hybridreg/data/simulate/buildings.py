@@ -7,6 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from hybridreg.data.simulate.chance import one
+from hybridreg.data.simulate.columns import stack
+from hybridreg.data.simulate.materials import MATERIAL_INDEX
 from hybridreg.data.simulate.mesh import Mesh, Tint
 from hybridreg.data.simulate.solids import boxes, loft, quads
 
@@ -38,7 +41,7 @@ class Style:
     @staticmethod
     def draw(rng: np.random.Generator) -> Style:
         """A building as towns have them."""
-        material = str(rng.choice(["plaster", "brick", "concrete"], p=[0.5, 0.3, 0.2]))
+        material = one(rng, ("plaster", "brick", "concrete"), (0.5, 0.3, 0.2))
         tint = np.array(_WALL_TINTS[rng.integers(len(_WALL_TINTS))]) * rng.uniform(0.8, 1.1)
         return Style(
             material,
@@ -47,7 +50,7 @@ class Style:
             rng.uniform(2.8, 3.8),
             (rng.uniform(0.3, 0.75), rng.uniform(0.4, 0.65)),
             rng.uniform(0.08, 0.4),
-            float(rng.choice([0.0, 0.0, rng.uniform(0.15, 0.5)])),
+            one(rng, (0.0, 0.0, rng.uniform(0.15, 0.5))),
             bool(rng.random() < 0.3),
             bool(rng.random() < 0.4),
         )
@@ -58,7 +61,7 @@ def _cells(style: Style, length: float, height: float, rng: np.random.Generator)
     across, up = max(1, round(length / style.cell)), max(1, round(height / style.storey))
     u = np.linspace(0, length, across + 1)
     z = np.linspace(0, height, up + 1)
-    left, bottom = (g.ravel() for g in np.meshgrid(u[:-1], z[:-1], indexing="ij"))
+    left, bottom = np.repeat(u[:-1], up), np.tile(z[:-1], across)
     width, storey = length / across, height / up
     ground = bottom < 0.1
     share_u = np.where(ground & style.shop, 0.85, style.window[0]) * np.where(
@@ -88,38 +91,38 @@ def facade(
     out = np.array([along[1], -along[0]])
     length = float(np.linalg.norm(end - start))
     u0, u1, z0, z1, w0, w1, s0, s1 = _cells(style, length, height, rng)
-
-    def corners(a: np.ndarray, b: np.ndarray, c: np.ndarray, d: np.ndarray, depth: float) -> np.ndarray:
-        u, z = np.stack([a, b, b, a]), np.stack([c, c, d, d])
-        x, y = start - depth * out
-        return np.stack([x + along[0] * u, y + along[1] * u, base + z])  # (3,4,n)
-
-    points = np.concatenate(
-        [corners(u0, u1, z0, z1, 0), corners(w0, w1, s0, s1, 0), corners(w0, w1, s0, s1, style.recess)], 1
+    u = np.stack(
+        [u0, u1, u1, u0, w0, w1, w1, w0, w0, w1, w1, w0], 1
+    )  # (n,12), as _WALL, _REVEAL and _PANE count
+    z = np.stack([z0, z0, z1, z1, s0, s0, s1, s1, s0, s0, s1, s1], 1)
+    depth = np.repeat([0.0, style.recess], [8, 4])
+    vertices = stack(
+        start[0] - depth * out[0] + along[0] * u, start[1] - depth * out[1] + along[1] * u, base + z
     )
-    stride = np.arange(0, 12 * len(u0), 12, dtype=np.int32)[:, None, None]
-    vertices = points.T.reshape(-1, 3).astype(np.float32)
-    pane_tint = np.array([0.25, 0.29, 0.33]) * rng.uniform(0.6, 1.3)
-    parts = [
-        Mesh.of(vertices, (_STONE + stride).reshape(-1, 3), style.material, style.tint),
-        # Curtains and blinds: a third of the windows answer like plaster, the others like glass.
-        *_panes(vertices, (_PANE + stride), pane_tint, rng),
-    ]
+    parts = [_wall(vertices, style, rng)]
     parts += _relief(start, along, out, base, length, height, style, (w0, w1, s0), rng)
     return parts
 
 
-def _panes(vertices: np.ndarray, faces: np.ndarray, tint: np.ndarray, rng: np.random.Generator) -> list[Mesh]:
-    covered = rng.random(len(faces)) < 0.35
-    return [
-        Mesh.of(vertices, faces[~covered].reshape(-1, 3), "glass", tint),
-        Mesh.of(
-            vertices,
-            faces[covered].reshape(-1, 3),
-            "plaster",
-            (rng.uniform(0.55, 0.9) * np.array([1.0, 0.97, 0.92])),
-        ),
-    ]
+def _wall(vertices: np.ndarray, style: Style, rng: np.random.Generator) -> Mesh:
+    """Stone and panes over the corners (12n,3) of n window cells."""
+    glass = np.array([0.25, 0.29, 0.33]) * rng.uniform(0.6, 1.3)
+    stride = np.arange(0, len(vertices), 12, dtype=np.int32)[:, None, None]
+    # Curtains and blinds: a third of the windows answer like plaster, the others like glass.
+    covered = rng.random(len(stride)) < 0.35
+    curtain = rng.uniform(0.55, 0.9) * np.array([1.0, 0.97, 0.92])
+    kinds = (
+        (_STONE + stride, style.material, style.tint),
+        (_PANE + stride[~covered], "glass", glass),
+        (_PANE + stride[covered], "plaster", curtain),
+    )
+    counts = [faces.size // 3 for faces, _, _ in kinds]
+    return Mesh(
+        vertices,
+        np.concatenate([faces.reshape(-1, 3) for faces, _, _ in kinds]),
+        np.repeat(np.array([MATERIAL_INDEX[material] for _, material, _ in kinds], np.uint8), counts),
+        np.repeat(np.array([tint for _, _, tint in kinds], np.float32).T, counts, axis=1).T,
+    )
 
 
 def _relief(
@@ -141,21 +144,31 @@ def _relief(
     if with_balcony.any():
         u = ((w0 + w1) / 2)[with_balcony]
         xy = start + u[:, None] * along + 0.6 * out
-        foot = np.c_[xy, base + sill[with_balcony] - 0.3]
+        foot = np.column_stack([xy, base + sill[with_balcony] - 0.3])
         parts.append(boxes(foot, np.array([style.cell * 0.8, 1.2, 0.15]), yaw, "concrete", dark))
-        rail = np.c_[xy + 0.55 * out, foot[:, 2] + 0.15]
+        rail = np.column_stack([xy + 0.55 * out, foot[:, 2] + 0.15])
         parts.append(boxes(rail, np.array([style.cell * 0.8, 0.06, 0.9]), yaw, "metal", (0.35, 0.35, 0.37)))
     if style.pillars:
         u = np.linspace(0.3, length - 0.3, max(2, int(length / (2 * style.cell))))
         xy = start + u[:, None] * along + 0.15 * out
         parts.append(
-            boxes(np.c_[xy, np.full(len(u), base)], np.array([0.5, 0.35, height]), yaw, "concrete", dark)
+            boxes(
+                np.column_stack([xy, np.full(len(u), base)]),
+                np.array([0.5, 0.35, height]),
+                yaw,
+                "concrete",
+                dark,
+            )
         )
     middle = start + 0.5 * length * along + 0.12 * out
     ledges = base + np.array([min(style.storey, height * 0.5), height - 0.35])
     parts.append(
         boxes(
-            np.c_[np.tile(middle, (2, 1)), ledges], np.array([length, 0.3, 0.25]), yaw, style.material, dark
+            np.array([[*middle, ledges[0]], [*middle, ledges[1]]]),
+            np.array([length, 0.3, 0.25]),
+            yaw,
+            style.material,
+            dark,
         )
     )
     return parts
@@ -184,7 +197,7 @@ def building(
 
 
 def _roof(corners: np.ndarray, top: float, style: Style, rng: np.random.Generator) -> list[Mesh]:
-    flat = np.c_[corners, np.full(4, top)]
+    flat = np.column_stack([corners, np.full(4, top)])
     parts = [quads(flat[None], "concrete", (0.4, 0.4, 0.4))]
     if rng.random() < 0.5:
         rise = rng.uniform(1.5, 4.0)

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from hybridreg.data.simulate.caster import Hits, World
+from hybridreg.data.simulate.columns import dot, outer, pick, put, stack, turned
 from hybridreg.data.simulate.layout import Surface
 from hybridreg.data.simulate.light import Light
 from hybridreg.data.simulate.materials import COLOUR, GLOSS, GROUND
@@ -49,9 +50,9 @@ class Camera:
         bulge = (1 + np.float32(self.distortion) * (u * u + v * v)) * np.float32(
             np.tan(np.radians(self.fov_deg) / 2)
         )
-        d = np.stack([np.ones_like(u), -u * bulge, -v * bulge], -1).reshape(-1, 3)
-        d /= np.sqrt(np.einsum("ij,ij->i", d, d))[:, None]
-        return d @ self.T_world_camera[:3, :3].T.astype(np.float32)
+        d = stack(np.ones_like(u), -u * bulge, -v * bulge)
+        d /= np.sqrt(dot(d, d))[:, None]
+        return turned(d, self.T_world_camera[:3, :3])
 
 
 def photograph(
@@ -63,34 +64,38 @@ def photograph(
     hits = with_ground(world.cast(origin, rays), origin, rays, surface)
     colour = np.empty_like(rays)
     solid, open_sky = np.flatnonzero(hits.face >= 0), np.flatnonzero(hits.face < 0)
-    colour[open_sky] = light.sky(rays.take(open_sky, axis=0))
-    colour[solid] = _surfaces(world, origin, rays.take(solid, axis=0), _rows(hits, solid), light)
-    return _develop(colour.reshape(UP, ACROSS, 3), light, rng)
+    put(colour, open_sky, light.sky(pick(rays, open_sky)))
+    put(colour, solid, _surfaces(world, origin, pick(rays, solid), _rows(hits, solid), light))
+    return _develop(np.ascontiguousarray(colour).reshape(UP, ACROSS, 3), light, rng)
 
 
 def _rows(hits: Hits, rows: np.ndarray) -> Hits:
-    return Hits(hits.distance[rows], hits.normal.take(rows, axis=0), hits.material[rows], hits.face[rows])
+    return Hits(
+        hits.distance.take(rows), pick(hits.normal, rows), hits.material.take(rows), hits.face.take(rows)
+    )
 
 
 def _surfaces(world: World, origin: np.ndarray, rays: np.ndarray, hits: Hits, light: Light) -> np.ndarray:
     points = origin + hits.distance[:, None] * rays
     colour = _tints(world, hits) * shade_factor(points, hits.normal, hits.material)[:, None]
-    skylight = (np.float32(0.75) + np.float32(0.25) * hits.normal[:, 2:3]) * light.ambient
-    colour *= skylight + _sunlight(world, points, hits.normal, light)[:, None] * light.sunshine
-    gloss = GLOSS[hits.material]
+    colour *= outer(np.float32(0.75) + np.float32(0.25) * hits.normal[:, 2], light.ambient) + outer(
+        _sunlight(world, points, hits.normal, light), light.sunshine
+    )
+    gloss = GLOSS.take(hits.material)
     shiny = np.flatnonzero(gloss > 0)
     if len(shiny):
-        ray, normal = rays[shiny], hits.normal[shiny]
-        away = ray - 2 * np.einsum("ij,ij->i", ray, normal)[:, None] * normal
-        colour[shiny] += gloss[shiny, None] * (light.sky(away) - colour[shiny])
+        ray, normal = pick(rays, shiny), pick(hits.normal, shiny)
+        away = ray - 2 * dot(ray, normal)[:, None] * normal
+        plain = pick(colour, shiny)
+        put(colour, shiny, plain + gloss[shiny, None] * (light.sky(away) - plain))
     haze = 1 - np.exp(hits.distance / np.float32(-light.visibility))[:, None]
     return np.asarray(colour + haze * (light.horizon - colour))
 
 
 def _tints(world: World, hits: Hits) -> np.ndarray:
-    tint = world.tint.take(hits.face, axis=0)
-    ground = np.flatnonzero(world.material[hits.face] == GROUND)
-    tint[ground] = COLOUR[hits.material[ground]]
+    tint = pick(world.tint, hits.face)
+    ground = np.flatnonzero(world.material.take(hits.face) == GROUND)
+    put(tint, ground, pick(COLOUR, hits.material.take(ground)))
     return tint
 
 
@@ -102,7 +107,8 @@ def _sunlight(world: World, points: np.ndarray, normal: np.ndarray, light: Light
         return sunlight
     lit = np.flatnonzero(facing > 0)
     to_sun = np.broadcast_to(SHADOWS * light.sun, (len(lit), 3))
-    sunlight[lit] = facing[lit] * world.clear(points[lit] + np.float32(0.03) * normal[lit], to_sun)
+    off_surface = pick(points, lit) + np.float32(0.03) * pick(normal, lit)
+    sunlight[lit] = facing[lit] * world.clear(off_surface, to_sun)
     return sunlight
 
 
@@ -114,9 +120,9 @@ def _develop(colour: np.ndarray, light: Light, rng: np.random.Generator) -> NDAr
     level = np.percentile(colour[::4, ::4].mean(-1), 65)
     gain = np.float32(0.45 / max(float(level), 1e-3) * light.exposure)
     v, u = np.linspace(-1, 1, UP, dtype=np.float32)[:, None], np.linspace(-1, 1, ACROSS, dtype=np.float32)
-    colour = (
-        colour * (gain * (1 - np.float32(light.vignette) * (u * u + v * v)))[..., None] * light.white_balance
-    )
+    shading = gain * (1 - np.float32(light.vignette) * (u * u + v * v))
+    colour *= np.repeat(shading, 3, axis=1).reshape(colour.shape)
+    colour *= np.tile(light.white_balance, ACROSS).reshape(ACROSS, 3)
     curve = np.sqrt(np.maximum(colour / (1 + np.float32(0.35) * colour), 0))
     curve += rng.standard_normal(colour.shape, dtype=np.float32) * np.float32(light.noise)
     small = (np.clip(curve, 0, 1) * 255).astype(np.uint8)

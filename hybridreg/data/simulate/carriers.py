@@ -67,5 +67,5 @@ def mount(
     T = np.eye(4)
     tilt = rng.normal(0, 0.025, 2)
     T[:3, :3] = Rotation.from_euler("ZYX", [yaw, *tilt]).as_matrix()
-    T[:3, 3] = [xy[0], xy[1], float(layout.terrain.height(*xy)) + carrier.height]
+    T[:3, 3] = [xy[0], xy[1], layout.terrain.height_at(xy) + carrier.height]
     return T

@@ -13,6 +13,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from hybridreg.data.simulate.columns import dot, pick
 from hybridreg.data.simulate.mesh import Mesh
 from hybridreg.data.simulate.solids import cross
 
@@ -71,17 +72,18 @@ class Open3dCaster:
         self._tensor = open3d.core.Tensor
         # Embree's own threads would fight over the cores with the other workers.
         self._scene = open3d.t.geometry.RaycastingScene(nthreads=1)
-        self._scene.add_triangles(self._tensor(mesh.vertices), self._tensor(mesh.faces.astype(np.uint32)))
+        vertices, faces = np.ascontiguousarray(mesh.vertices), mesh.faces.astype(np.uint32)
+        self._scene.add_triangles(self._tensor(vertices), self._tensor(faces))
 
     def cast(self, rays: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """See `Caster.cast`."""
-        found = self._scene.cast_rays(self._tensor(rays))
+        found = self._scene.cast_rays(self._tensor.from_numpy(rays))
         # Open3D's mark of a miss, 2^32 - 1, is -1 when read as a signed number.
         return found["t_hit"].numpy(), found["primitive_ids"].numpy().view(np.int32)
 
     def blocked(self, rays: np.ndarray) -> np.ndarray:
         """See `Caster.blocked`."""
-        blocked: np.ndarray = self._scene.test_occlusions(self._tensor(rays), 0.0, 1.0).numpy()
+        blocked: np.ndarray = self._scene.test_occlusions(self._tensor.from_numpy(rays), 0.0, 1.0).numpy()
         return blocked
 
 
@@ -113,9 +115,10 @@ class Part:
 
 
 def _face_normals(mesh: Mesh) -> NDArray[np.float32]:
-    a, b, c = (mesh.vertices[mesh.faces[:, k]] for k in range(3))
-    normal = cross(b - a, c - a)
-    return normal / np.maximum(np.sqrt(np.einsum("ij,ij->i", normal, normal)), 1e-12)[:, None]
+    vertices = np.asfortranarray(mesh.vertices)
+    a, b, c = (pick(vertices, mesh.faces[:, k]) for k in range(3))
+    normal = np.asfortranarray(cross(b - a, c - a))
+    return normal / np.maximum(np.sqrt(dot(normal, normal)), 1e-12)[:, None]
 
 
 class World:
@@ -123,38 +126,38 @@ class World:
 
     def __init__(self, parts: list[Part]) -> None:
         parts = [part for part in parts if len(part.mesh.faces)]
-        self._casters = [part.caster for part in parts]
+        self._parts = parts
         self._first = np.cumsum([0] + [len(part.mesh.faces) for part in parts[:-1]], dtype=np.int32)
-        self._normal = np.concatenate([part.normals for part in parts])
+        self._normal = np.concatenate([part.normals.T for part in parts], axis=1).T
         self.material = np.concatenate([part.mesh.material for part in parts])
         self.tint = np.concatenate([part.mesh.tint for part in parts])
 
     def cast(self, origins: np.ndarray, directions: np.ndarray) -> Hits:
         """First hits of rays from `origins` (n,3) or (3,) along unit `directions` (n,3)."""
         rays = _rays(origins, directions)
-        distance, face = self._casters[0].cast(rays)
-        for first, caster in zip(self._first[1:], self._casters[1:], strict=True):
-            t, other = caster.cast(rays)
+        distance, face = self._parts[0].caster.cast(rays)
+        for first, part in zip(self._first[1:], self._parts[1:], strict=True):
+            t, other = part.caster.cast(rays)
             nearer = np.flatnonzero(t < distance)
             distance[nearer] = t[nearer]
             face[nearer] = other[nearer] + first
-        normal = self._normal.take(
-            face, axis=0, mode="wrap"
-        )  # a ray without a hit has face -1: its normal is never used
-        along = np.einsum("ij,ij->i", normal, directions)
-        normal *= np.copysign(np.float32(1), -along)[:, None]
-        return Hits(distance, normal, self.material[face], face)
+        normal = pick(self._normal, face)  # a ray without a hit has face -1: its normal is never used
+        normal *= np.copysign(np.float32(1), -dot(normal, directions))[:, None]
+        return Hits(distance, normal, self.material.take(face, mode="wrap"), face)
 
     def clear(self, origins: np.ndarray, segments: np.ndarray) -> NDArray[np.bool_]:
         """Whether nothing stands on the way (n,3) from `origins` (n,3) or (3,) to `origins + segments`."""
         rays = _rays(origins, segments)
-        blocked = self._casters[0].blocked(rays)
-        for caster in self._casters[1:]:
-            blocked = blocked | caster.blocked(rays)
-        return ~blocked
+        clear = np.arange(len(rays))
+        for part in self._parts:
+            clear = clear[~part.caster.blocked(rays.take(clear, axis=0))]
+        result = np.zeros(len(rays), bool)
+        result[clear] = True
+        return result
 
 
 def _rays(origins: np.ndarray, directions: np.ndarray) -> NDArray[np.float32]:
     rays = np.empty((len(directions), 6), np.float32)
-    rays[:, :3], rays[:, 3:] = origins, directions
+    for k in range(3):  # three times as fast as both halves at once
+        rays[:, k], rays[:, 3 + k] = origins[..., k], directions[:, k]
     return rays

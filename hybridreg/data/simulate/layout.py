@@ -10,6 +10,7 @@ import numpy as np
 
 from hybridreg.data.simulate.ground import Terrain
 from hybridreg.data.simulate.mesh import Mesh
+from hybridreg.data.simulate.taken import Taken
 
 # Material index of the ground at x, y.
 Surface = Callable[[np.ndarray, np.ndarray], np.ndarray]
@@ -29,26 +30,19 @@ class Layout:
         default_factory=list
     )  # movers when the source scans (and the picture is taken)
     at_target: list[Mesh] = field(default_factory=list)  # the same movers when the target scans
-    taken: np.ndarray = field(
-        default_factory=lambda: np.zeros((6, 0))
-    )  # rows x, y, half sizes, cosine and sine of yaw
+    taken: Taken = field(default_factory=Taken)
 
     def free(self, xy: np.ndarray, radius: float) -> bool:
         """Whether a disc about `xy` (2,) touches nothing."""
-        x, y, hx, hy, c, s = self.taken
-        dx, dy = xy[0] - x, xy[1] - y
-        gap_x = np.maximum(np.abs(c * dx + s * dy) - hx, 0)
-        gap_y = np.maximum(np.abs(c * dy - s * dx) - hy, 0)
-        return bool((gap_x**2 + gap_y**2 > radius**2).all())
+        return self.taken.free(xy, radius)
 
     def claim(self, xy: np.ndarray, half: tuple[float, float], yaw: float = 0.0) -> None:
         """Mark a rectangle as taken."""
-        column = [[xy[0]], [xy[1]], [half[0]], [half[1]], [np.cos(yaw)], [np.sin(yaw)]]
-        self.taken = np.concatenate([self.taken, column], axis=1)
+        self.taken.add(xy, half, yaw)
 
     def on_ground(self, thing: Mesh, xy: np.ndarray, yaw: float = 0.0) -> Mesh:
         """`thing` (made about the origin) turned and set down at `xy`."""
-        return thing.moved(yaw, (xy[0], xy[1], float(self.terrain.height(xy[0], xy[1]))))
+        return thing.moved(yaw, (xy[0], xy[1], self.terrain.height_at(xy)))
 
     def put(self, thing: Mesh, xy: np.ndarray, yaw: float, half: tuple[float, float]) -> bool:
         """Set down a thing that stays, unless something is there already; says whether it was set down."""
@@ -83,4 +77,4 @@ class Layout:
         """Points (n,3) on the ground from `start` (2,) to `end` (2,), at least two."""
         n = max(2, round(float(np.linalg.norm(end - start)) / spacing) + 1)
         xy = start + np.linspace(0, 1, n)[:, None] * (end - start)
-        return np.c_[xy, self.terrain.height(xy[:, 0], xy[:, 1])]
+        return np.column_stack([xy, self.terrain.height(xy[:, 0], xy[:, 1])])

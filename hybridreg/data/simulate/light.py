@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from hybridreg.data.simulate.columns import outer
 from hybridreg.data.simulate.texture import noise_at
 
 
@@ -54,11 +55,11 @@ class Light:
     def sky(self, rays: np.ndarray) -> np.ndarray:
         """Colour (n,3) of the sky along `rays` (n,3), with clouds on a layer overhead."""
         up = np.clip(rays[:, 2], 0.0, 1.0)
-        colour = self.horizon + (np.sqrt(up)[:, None]) * (self.zenith - self.horizon)
-        layer = rays[:, :2] / np.maximum(up, 0.03)[:, None] * 120 + self.drift
-        puff = noise_at(layer[:, 0], layer[:, 1], 600.0)
+        colour = self.horizon + outer(np.sqrt(up), self.zenith - self.horizon)
+        x, y = (rays[:, k] / np.maximum(up, 0.03) * 120 + self.drift[k] for k in range(2))
+        puff = noise_at(x, y, 600.0)
         cover = np.clip((puff + 2.4 * self.clouds - 1.2) * 0.8, 0, 1) * np.clip(up * 8, 0, 1)
-        colour += cover[:, None] * ((0.82 + 0.1 * puff)[:, None] * _rgb(1.0, 1.0, 1.02) - colour)
+        colour += cover[:, None] * (outer(0.82 + 0.1 * puff, _rgb(1.0, 1.0, 1.02)) - colour)
         glow = np.clip(rays @ self.sun, 0, 1) ** 60 * np.float32(0.8 * (1 - self.clouds))
         return np.asarray(colour + glow[:, None], np.float32)
 

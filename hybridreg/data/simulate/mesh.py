@@ -18,7 +18,10 @@ Colour = Sequence[float] | NDArray[Any]  # red, green, blue in [0,1]
 
 @dataclass(frozen=True)
 class Mesh:
-    """vertices (V,3) float32 in metres, faces (F,3) int32, material (F,) uint8, tint (F,3) float32 in [0,1]."""
+    """vertices (V,3) float32 in metres, faces (F,3) int32, material (F,) uint8, tint (F,3) float32 in [0,1].
+
+    Vertices and tints come out of `merge` and `moved` stored column by column.
+    """
 
     vertices: NDArray[np.float32]
     faces: NDArray[np.int32]
@@ -45,18 +48,20 @@ class Mesh:
             return EMPTY
         starts = np.cumsum([0] + [len(p.vertices) for p in pieces[:-1]])
         return Mesh(
-            np.concatenate([p.vertices for p in pieces]),
+            np.concatenate([p.vertices.T for p in pieces], axis=1).T,
             np.concatenate([p.faces + np.int32(s) for p, s in zip(pieces, starts, strict=True)]),
             np.concatenate([p.material for p in pieces]),
-            np.concatenate([p.tint for p in pieces]),
+            np.concatenate([p.tint.T for p in pieces], axis=1).T,
         )
 
     def moved(self, yaw: float, offset: Sequence[float]) -> Mesh:
         """Turned by `yaw` radians about z, then shifted by `offset` (3,)."""
         c, s = np.cos(yaw), np.sin(yaw)
-        turn = np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]], np.float32)
-        vertices = self.vertices @ turn + np.asarray(offset, np.float32)
-        return Mesh(vertices, self.faces, self.material, self.tint)
+        turn = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]], np.float32)
+        x, y, z = offset
+        vertices = turn @ self.vertices.T
+        vertices += np.array([[x], [y], [z]], np.float32)
+        return Mesh(vertices.T, self.faces, self.material, self.tint)
 
 
 EMPTY = Mesh(

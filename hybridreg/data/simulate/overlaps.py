@@ -22,17 +22,23 @@ def thin(points: np.ndarray, voxel: float) -> np.ndarray:
 
 def first_of_cubes(points: np.ndarray, voxel: float) -> np.ndarray:
     """Index (m,) of the first point in each occupied cube, cube after cube."""
-    cell = np.floor(points / voxel)
-    cell -= cell.min(axis=0)
-    n, span = len(points), [int(s) + 1 for s in cell.max(axis=0)]
+    cells = [_cells(points[:, k], voxel) for k in range(3)]
+    n, span = len(points), [int(cell.max()) + 1 for cell in cells]
     if span[0] * span[1] * span[2] * n >= 2**63:
         raise ValueError(f"voxel={voxel} m is too fine for a cloud of {span} cubes")
-    x, y, z = cell.T.astype(np.int64)
+    x, y, z = (cell.astype(np.int64) for cell in cells)
     # Cube and point in one number: sorting numbers is several times as fast as sorting an index by them.
     tagged = np.sort(((x * span[1] + y) * span[2] + z) * n + np.arange(n))
     cube = tagged // n
-    first = np.flatnonzero(np.diff(cube, prepend=-1))
+    first = np.flatnonzero(np.r_[True, cube[1:] != cube[:-1]])
     return np.asarray(tagged[first] - cube[first] * n)
+
+
+def _cells(coordinate: np.ndarray, voxel: float) -> np.ndarray:
+    """Number (n,) of the cube along one axis, from zero."""
+    cell = np.floor(coordinate / voxel)
+    cell -= cell.min()
+    return cell
 
 
 def overlap(
@@ -43,7 +49,8 @@ def overlap(
         return 0.0
     moved = source @ T_target_source[:3, :3].T + T_target_source[:3, 3]
     low, high = moved.min(axis=0) - radius, moved.max(axis=0) + radius
-    near = target[((target >= low) & (target <= high)).all(axis=1)]
+    inside = [(target[:, k] >= low[k]) & (target[:, k] <= high[k]) for k in range(3)]
+    near = target[inside[0] & inside[1] & inside[2]]
     # A tree that is not balanced is built three times as fast and asked nearly as fast.
     tree = cKDTree(near, balanced_tree=False, compact_nodes=False)
     distance, _ = tree.query(moved, distance_upper_bound=radius)

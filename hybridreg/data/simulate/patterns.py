@@ -7,18 +7,16 @@ from collections.abc import Callable
 
 import numpy as np
 
+from hybridreg.data.simulate.columns import stack
 from hybridreg.data.simulate.sensors import Sensor
 
 
 def _directions(azimuth: np.ndarray, elevation: np.ndarray) -> np.ndarray:
     # Single precision is four times as fast, and a tenth of a millimetre at a hundred metres.
     azimuth, elevation = azimuth.astype(np.float32), elevation.astype(np.float32)
-    directions = np.empty((*np.broadcast_shapes(azimuth.shape, elevation.shape), 3), np.float32)
     level = np.cos(elevation)
-    directions[..., 0] = level * np.cos(azimuth)
-    directions[..., 1] = level * np.sin(azimuth)
-    directions[..., 2] = np.sin(elevation)
-    return directions.reshape(-1, 3)
+    up = np.broadcast_to(np.sin(elevation), np.broadcast_shapes(azimuth.shape, elevation.shape))
+    return stack(level * np.cos(azimuth), level * np.sin(azimuth), up)
 
 
 def spinning(sensor: Sensor, rng: np.random.Generator) -> np.ndarray:
@@ -47,7 +45,7 @@ def fan(sensor: Sensor, rng: np.random.Generator) -> np.ndarray:
         up = high * tilt[:, None] + 0.012 * swing[None, :] ** 2 * (1 if k % 2 else -1) + rng.normal(0, 0.0015)
         up = up + np.linspace(0, high / rows, columns)[None, :]
         parts.append(_directions(across, up))
-    return np.concatenate(parts)
+    return np.concatenate([part.T for part in parts], axis=1).T
 
 
 def rosette(sensor: Sensor, rng: np.random.Generator) -> np.ndarray:
@@ -86,5 +84,5 @@ PATTERNS: dict[str, Callable[[Sensor, np.random.Generator], np.ndarray]] = {
 
 
 def pattern(sensor: Sensor, rng: np.random.Generator) -> np.ndarray:
-    """Unit directions (n,3) float32 of one scan, in firing order."""
+    """Unit directions (n,3) float32 of one scan, in firing order, stored column by column."""
     return PATTERNS[sensor.kind](sensor, rng)

@@ -3,10 +3,12 @@
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from functools import partial
 
 import numpy as np
 
+from hybridreg.data.simulate.chance import one
 from hybridreg.data.simulate.mesh import Mesh
 from hybridreg.data.simulate.pool import one_of
 from hybridreg.data.simulate.solids import boxes, cards, tubes
@@ -58,8 +60,8 @@ TREES = {(kind, leaves): partial(tree, kind=kind, leaves=leaves) for kind in KIN
 
 def tree_from_pool(rng: np.random.Generator, distance: float, kind: str | None = None) -> Mesh:
     """A tree as fine as its `distance` (metres) from the scene's centre deserves; kind None draws one."""
-    kind = kind or str(rng.choice(list(KINDS), p=list(KINDS.values())))
-    leaves = FINENESS[int(np.searchsorted([24.0, 45.0], distance))]
+    kind = kind or one(rng, tuple(KINDS), tuple(KINDS.values()))
+    leaves = FINENESS[bisect_left((24.0, 45.0), distance)]
     return one_of(TREES[kind, leaves], rng, variants=40, stretch=0.16)
 
 

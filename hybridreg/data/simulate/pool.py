@@ -16,7 +16,8 @@ Maker = Callable[[np.random.Generator], Mesh]
 @lru_cache(maxsize=4096)
 def _variant(maker: Maker, number: int) -> Mesh:
     # Seeded by its number alone: which variants were made before changes nothing.
-    return maker(np.random.default_rng([number, 2509]))
+    # Merged, because that stores it column by column.
+    return Mesh.merge([maker(np.random.default_rng([number, 2509]))])
 
 
 def one_of(maker: Maker, rng: np.random.Generator, variants: int = 64, stretch: float = 0.06) -> Mesh:

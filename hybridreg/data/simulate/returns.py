@@ -6,6 +6,7 @@ from __future__ import annotations
 import numpy as np
 
 from hybridreg.data.simulate.caster import Hits
+from hybridreg.data.simulate.columns import dot
 from hybridreg.data.simulate.materials import LOST, MATERIAL_INDEX, REFLECTIVITY, ROUGHNESS
 from hybridreg.data.simulate.sensors import Sensor
 
@@ -27,11 +28,11 @@ def measured_ranges(
     gauss = rng.standard_normal(n, dtype=np.float32)
     hit = hits.face >= 0
     t = np.where(hit, hits.distance, np.float32(0))
-    cosine = np.clip(-np.einsum("ij,ij->i", hits.normal, directions), 0.01, 1.0)
+    cosine = np.clip(-dot(hits.normal, directions), 0.01, 1.0)
     # The radar equation for a rough surface that fills the beam, against the data sheet's 10 % target.
     reach = np.float32(sensor.range_10) / np.maximum(t, np.float32(0.1))
-    power = 10 * REFLECTIVITY[hits.material] * np.sqrt(cosine) * reach * reach
-    returned = chance[0] * (1 + 1 / (power * power * np.sqrt(power))) < 1 - LOST[hits.material]
+    power = (10 * REFLECTIVITY).take(hits.material) * np.sqrt(cosine) * reach * reach
+    returned = chance[0] * (1 + 1 / (power * power * np.sqrt(power))) < (1 - LOST).take(hits.material)
     returned &= hit
     mixed = _mix_edges(t, returned, chance[1], chance[2])
     ranges = np.where(returned, mixed + _noise(sensor, t, cosine, hits.material) * gauss, np.float32(np.nan))
@@ -49,8 +50,8 @@ def _noise(sensor: Sensor, t: np.ndarray, cosine: np.ndarray, material: np.ndarr
     # The footprint's length along the ray is divergence x range x tan(incidence).
     slant = np.sqrt(1 - cosine * cosine) / cosine
     smear = np.minimum(np.float32(0.04e-3 * sensor.divergence_mrad) * t * slant, np.float32(0.15))
-    rough = ROUGHNESS[material]
-    return np.asarray(np.sqrt(clock * clock + smear * smear + rough * rough))
+    rough = (ROUGHNESS * ROUGHNESS).take(material)
+    return np.asarray(np.sqrt(clock * clock + smear * smear + rough))
 
 
 def _mix_edges(t: np.ndarray, returned: np.ndarray, chance: np.ndarray, share: np.ndarray) -> np.ndarray:

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from hybridreg.data.simulate.columns import stack
 from hybridreg.data.simulate.mesh import Colour, Mesh
 
 _BOX = np.array(
@@ -40,10 +41,10 @@ def boxes(base: np.ndarray, size: np.ndarray, yaw: float | np.ndarray, material:
     angle = np.asarray(yaw).reshape(-1, 1)
     c, s = np.cos(angle), np.sin(angle)
     x, y = local[..., 0], local[..., 1]
-    corners = np.empty((len(base), 8, 3))
-    corners[..., 0], corners[..., 1], corners[..., 2] = c * x - s * y, s * x + c * y, local[..., 2]
-    corners += base[:, None]
-    return Mesh.of(corners.reshape(-1, 3), _repeat(_BOX_FACES, len(base), 8), material, tint)
+    up = np.broadcast_to(local[..., 2], (len(base), 8))
+    east, north, height = (np.asarray(base)[:, k, None] for k in range(3))
+    corners = stack(c * x - s * y + east, s * x + c * y + north, up + height)
+    return Mesh.of(corners, _repeat(_BOX_FACES, len(base), 8), material, tint)
 
 
 def tubes(

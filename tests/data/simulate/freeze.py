@@ -3,10 +3,10 @@
 
 Run it together with a new `splits.VERSION`, never alone.
 
-Where the processor and the libraries are those that wrote frozen.json, the bytes of both clouds must be the
-same. Elsewhere last bits may differ in sines, products and the ray caster, so that here and there a coordinate
-falls on the other side of its 4 mm grid, or a pulse is lost: the pose must then agree to a micrometre, and 95 %
-of the points in a sample chosen by the points' own hashes must be the very same.
+Where the processor and the libraries are those that wrote frozen.json, the bytes of both clouds and of the
+photograph must be the same. Elsewhere last bits may differ in sines, products and the ray caster, so that here and
+there a coordinate falls on the other side of its 4 mm grid, or a pulse is lost: the pose must then agree to a
+micrometre, and 95 % of the points in a sample chosen by the points' own hashes must be the very same.
 """
 
 from __future__ import annotations
@@ -24,6 +24,8 @@ from hybridreg.data.simulate import TIERS, VERSION, draw, pair_number
 from hybridreg.data.simulate.jpeg import decode
 
 FROZEN = Path(__file__).with_name("frozen.json")
+LIBRARIES = ("numpy", "scipy", "open3d", "embreex", "opencv-python-headless")
+NUMBERS = (0, 1, 16, 49)  # pairs of each tier: the first two, the last, and one between
 ONE_IN = 1024  # points of the sample
 
 
@@ -45,9 +47,9 @@ def sample(cloud: np.ndarray) -> list[int]:
     return sorted({int(v) for v in mixed[mixed % ONE_IN == 0]})
 
 
-def fingerprint(tier: str) -> dict[str, Any]:
-    """The first pair of `sim:test/<tier>`."""
-    drawn = draw(tier, pair_number("test", 0, 0))
+def fingerprint(tier: str, index: int) -> dict[str, Any]:
+    """Pair `index` of `sim:test/<tier>`."""
+    drawn = draw(tier, pair_number("test", 0, index))
     clouds = (drawn.source, drawn.target)
     return {
         "scene": drawn.scene,
@@ -55,7 +57,7 @@ def fingerprint(tier: str) -> dict[str, Any]:
         "T_target_source": drawn.T_target_source.tolist(),
         "overlap": drawn.overlap,
         "points": [len(cloud) for cloud in clouds],
-        "checksums": [checksum(cloud) for cloud in clouds],
+        "checksums": [*(checksum(cloud) for cloud in clouds), hashlib.sha256(drawn.jpeg).hexdigest()],
         "samples": [sample(cloud) for cloud in clouds],
         "colour": decode(drawn.jpeg).mean(axis=(0, 1)).round(2).tolist(),
     }
@@ -65,7 +67,7 @@ def machine() -> dict[str, str]:
     """What last bits hang on."""
     return {
         "processor": _processor(),
-        **{name: _installed(name) for name in ("numpy", "scipy", "open3d", "embreex")},
+        **{name: _installed(name) for name in LIBRARIES},
     }
 
 
@@ -86,6 +88,6 @@ def _installed(name: str) -> str:
 
 
 if __name__ == "__main__":
-    prints = {tier: fingerprint(tier) for tier in TIERS}
-    content = {"version": VERSION, "machine": machine(), "first": prints}
+    prints = {tier: {str(index): fingerprint(tier, index) for index in NUMBERS} for tier in TIERS}
+    content = {"version": VERSION, "machine": machine(), "pairs": prints}
     FROZEN.write_text(json.dumps(content, indent=None, separators=(",", ":")).replace('},"', '},\n"') + "\n")

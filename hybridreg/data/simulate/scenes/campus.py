@@ -20,6 +20,7 @@ from hybridreg.data.simulate.scenes.scatter import (
     in_box,
     plant_bushes,
     plant_trees,
+    spot,
 )
 
 
@@ -42,7 +43,7 @@ def _paths(rng: np.random.Generator) -> Surface:
 def campus(rng: np.random.Generator) -> Layout:
     """Buildings on every side, none parallel to the next by rule."""
     terrain = Terrain.draw(rng, rng.uniform(0.4, 1.0))
-    layout = Layout(terrain, _paths(rng), lambda r: in_box(r, (-30, -30), (30, 30), 1)[0])
+    layout = Layout(terrain, _paths(rng), lambda r: spot(r, 30))
     layout.still.append(terrain.mesh(rng, 0.025))
     square = rng.random() < 0.4
     for _ in range(int(rng.integers(7, 15))):
@@ -71,7 +72,7 @@ def _place_building(layout: Layout, rng: np.random.Generator, square: bool) -> N
     yaw = float(rng.choice([0, np.pi / 2])) if square else rng.uniform(0, np.pi)
     if not layout.free(xy, float(size[0]) / 2) or np.linalg.norm(xy) < size[0] / 2 + 5:
         return
-    base = float(layout.terrain.height(*xy)) - 1.5
+    base = layout.terrain.height_at(xy) - 1.5
     layout.still.append(building(xy, size + [0, 0, 1.5], yaw, base, rng, np.zeros(2)))
     layout.claim(xy, (size[0] / 2, size[1] / 2), yaw)
 

@@ -45,7 +45,7 @@ def park(rng: np.random.Generator) -> Layout:
     for _ in range(int(rng.integers(1, 5))):
         angle, far = rng.uniform(0, 6.28), rng.uniform(28, 65)
         xy, size = far * np.array([np.cos(angle), np.sin(angle)]), rng.uniform([8, 7, 3.5], [25, 14, 12])
-        base = float(layout.terrain.height(*xy)) - 1.0
+        base = layout.terrain.height_at(xy) - 1.0
         layout.still.append(building(xy, size, rng.uniform(0, 3.14), base, rng, np.zeros(2)))
         layout.claim(xy, (float(size[0]) / 2, float(size[0]) / 2))
     plant_trees(layout, in_box(rng, (-70, -70), (70, 70), int(rng.integers(22, 55))), rng)

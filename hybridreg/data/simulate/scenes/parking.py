@@ -6,6 +6,7 @@ from __future__ import annotations
 import numpy as np
 
 from hybridreg.data.simulate.buildings import building
+from hybridreg.data.simulate.chance import one
 from hybridreg.data.simulate.furniture import lamp
 from hybridreg.data.simulate.ground import Terrain
 from hybridreg.data.simulate.layout import Layout
@@ -54,7 +55,7 @@ def parking(rng: np.random.Generator) -> Layout:
 
 
 def _parked(layout: Layout, xy: np.ndarray, rng: np.random.Generator) -> None:
-    add_car(layout, xy, float(rng.choice([-1, 1])) * np.pi / 2 + rng.normal(0, 0.03), rng, leaves=0.1)
+    add_car(layout, xy, one(rng, (-1, 1)) * np.pi / 2 + rng.normal(0, 0.03), rng, leaves=0.1)
 
 
 def _surround(layout: Layout, half: float, rng: np.random.Generator) -> None:
@@ -65,7 +66,7 @@ def _surround(layout: Layout, half: float, rng: np.random.Generator) -> None:
         if rng.random() < 0.55:
             size = np.array([rng.uniform(20, 60), rng.uniform(12, 25), rng.uniform(4.5, 14)])
             xy = out * (half + 3 + size[1] / 2) + across * rng.uniform(-15, 15)
-            base = float(layout.terrain.height(*xy)) - 1.0
+            base = layout.terrain.height_at(xy) - 1.0
             layout.still.append(building(xy, size, angle + np.pi / 2, base, rng, np.zeros(2)))
             layout.claim(xy, (size[0] / 2, size[1] / 2), angle + np.pi / 2)
         line = out * (half + 2.5) + across * np.arange(-half, half, rng.uniform(5, 12))[:, None]

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from hybridreg.data.simulate.cars import car
+from hybridreg.data.simulate.chance import one
 from hybridreg.data.simulate.furniture import bench, billboard, bin_or_cabinet, lamp, sign
 from hybridreg.data.simulate.layout import Layout
 from hybridreg.data.simulate.people import bicycle, person, rider
@@ -22,6 +23,12 @@ def in_box(rng: np.random.Generator, low: Sequence[float], high: Sequence[float]
         middle
         + rng.uniform(-1, 1, (n, 2)) * rng.uniform(0.25, 1, (n, 1)) * (np.asarray(high) - np.asarray(low)) / 2
     )
+
+
+def spot(rng: np.random.Generator, half: float) -> np.ndarray:
+    """What `in_box` would give for one place (2,) of a square about the origin, sooner."""
+    x, y, far = rng.uniform(-1, 1), rng.uniform(-1, 1), rng.uniform(0.25, 1)
+    return np.array([x * far * half, y * far * half])
 
 
 def plant_trees(
@@ -85,12 +92,12 @@ def add_car(
 
 
 def _when(rng: np.random.Generator, both: float = 0.6) -> str:
-    return str(rng.choice(["both", "source", "target"], p=[both, (1 - both) / 2, (1 - both) / 2]))
+    return one(rng, ("both", "source", "target"), (both, (1 - both) / 2, (1 - both) / 2))
 
 
 def add_furniture(layout: Layout, places: np.ndarray, yaw: float, rng: np.random.Generator) -> None:
     """Small things at `places` (n,2), turned by `yaw`."""
     makers = (bench, bin_or_cabinet, sign, billboard, lamp)
     for xy in places:
-        thing = one_of(makers[rng.choice(5, p=[0.2, 0.3, 0.25, 0.1, 0.15])], rng, stretch=0.12)
-        layout.put(thing, xy, yaw + rng.choice([0, np.pi / 2, np.pi]) + rng.normal(0, 0.1), (0.4, 0.4))
+        thing = one_of(one(rng, makers, (0.2, 0.3, 0.25, 0.1, 0.15)), rng, stretch=0.12)
+        layout.put(thing, xy, yaw + one(rng, (0, np.pi / 2, np.pi)) + rng.normal(0, 0.1), (0.4, 0.4))

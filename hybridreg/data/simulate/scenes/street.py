@@ -123,7 +123,7 @@ def _houses(layout: Layout, course: Course, side: float, rng: np.random.Generato
         off_crossing = course.crossing is None or abs(mid - course.crossing) > size[0] / 2 + course.road + 1
         if off_crossing and rng.random() < 0.93:
             yaw = course.yaw(mid) + (np.pi if side > 0 else 0)
-            base = float(layout.terrain.height(*xy)) - 1.0
+            base = layout.terrain.height_at(xy) - 1.0
             size[2] += 1.0
             layout.still.append(building(xy, size, yaw, base, rng, eye))
             layout.claim(xy, (size[0] / 2, size[1] / 2), yaw)

@@ -13,7 +13,14 @@ from hybridreg.data.simulate.layout import Layout
 from hybridreg.data.simulate.materials import MATERIAL_INDEX
 from hybridreg.data.simulate.pool import one_of
 from hybridreg.data.simulate.scenes.backdrop import add_backdrop
-from hybridreg.data.simulate.scenes.scatter import add_car, add_people, in_box, plant_bushes, plant_trees
+from hybridreg.data.simulate.scenes.scatter import (
+    add_car,
+    add_people,
+    in_box,
+    plant_bushes,
+    plant_trees,
+    spot,
+)
 
 
 def yard(rng: np.random.Generator) -> Layout:
@@ -27,7 +34,7 @@ def yard(rng: np.random.Generator) -> Layout:
     def surface(x: np.ndarray, y: np.ndarray) -> np.ndarray:
         return np.where(np.sin(0.07 * x + seam[0]) + np.sin(0.09 * y + seam[1]) > -0.3, hard, soft)
 
-    layout = Layout(terrain, surface, lambda r: in_box(r, (-28, -28), (28, 28), 1)[0])
+    layout = Layout(terrain, surface, lambda r: spot(r, 28))
     layout.still.append(terrain.mesh(rng, 0.04))
     _halls(layout, rng)
     _stacks(layout, rng)
@@ -51,7 +58,7 @@ def _halls(layout: Layout, rng: np.random.Generator) -> None:
         xy = (rng.uniform(14, 45) + size[0] / 2) * np.array([np.cos(angle), np.sin(angle)])
         yaw = angle + rng.choice([0, np.pi / 2]) + rng.normal(0, 0.15)
         if layout.free(xy, float(size[0]) / 2):
-            base = float(layout.terrain.height(*xy)) - 1.0
+            base = layout.terrain.height_at(xy) - 1.0
             layout.still.append(building(xy, size, yaw, base, rng, np.zeros(2)))
             layout.claim(xy, (float(size[0]) / 2, float(size[1]) / 2), yaw)
 

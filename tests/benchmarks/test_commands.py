@@ -1,0 +1,44 @@
+# SPDX-License-Identifier: MIT
+"""Every benchmark is a module run from the checkout's root, and says so."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+SCRIPTS = [
+    p for p in sorted((ROOT / "benchmarks").glob("*.py")) if "__main__" in p.read_text(encoding="utf-8")
+]
+PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")), *sorted(ROOT.glob("*/README.md"))]
+
+
+@pytest.mark.parametrize("script", SCRIPTS, ids=lambda p: p.stem)
+def test_a_script_names_its_own_command(script: Path) -> None:
+    name = "benchmarks" if script.stem == "__main__" else f"benchmarks.{script.stem}"
+    text = script.read_text(encoding="utf-8")
+    assert re.search(rf"python -m {re.escape(name)}\b", text.split('"""')[1])
+    assert "python benchmarks/" not in text
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda p: str(p.relative_to(ROOT)))
+def test_pages_name_commands_that_exist(page: Path) -> None:
+    text = page.read_text(encoding="utf-8")
+    assert "python benchmarks/" not in text
+    named = set(re.findall(r"python -m benchmarks\.([a-z_]+)", text))
+    assert named <= {script.stem for script in SCRIPTS}
+
+
+def test_a_checkout_alone_is_enough() -> None:
+    """Isolated from PYTHONPATH; the checkout's root is all that the command adds."""
+    code = "import sys, runpy; sys.path.insert(0, '.'); sys.argv = ['x', '--help']; "
+    code += "runpy.run_module('benchmarks.simulator_speed', run_name='__main__')"
+    done = subprocess.run(
+        [sys.executable, "-I", "-c", code], cwd=ROOT, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    assert "--workers" in done.stdout
