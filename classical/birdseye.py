@@ -27,11 +27,11 @@ Side = Literal["source", "target"]
 
 # Outdoors; in a room, so many voxels along the distance within which all but a hundredth of the points lie.
 _VOXEL, _ALONG_REACH = 0.5, 60.0
-# In voxels: the coarse map's cell, how far from the sensor points are used.
-_COARSE, _REACH = 3.0, 200.0
-# Degrees between yaws; peaks that are looked at closely; a pose is refined if it has this share of the best's score.
-_YAW_STEP_DEG, _PEAKS, _SHARE = 4.0, 48, 0.6
-_FEWEST_POINTS = 3
+# In voxels: the coarse map's cell, the grid on which GICP refines the candidates, how far from the sensor points
+# are used.
+_COARSE, _ROUGH, _REACH = 3.0, 1.6, 200.0
+# Degrees between yaws; peaks for each pose that is refined, as some meet; the share of the best one's score they need.
+_YAW_STEP_DEG, _PEAKS, _SHARE = 4.0, 3, 0.75
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -84,7 +84,8 @@ class BirdsEye(Stage):
             scene.note("bird's-eye search: nothing stands on the ground")
             return Pose.unknown()
         starts = [se3.inverse(frames[1]) @ M @ frames[0] for M in self._planar(*views, voxel)]
-        ranked = best_first(own, starts, Gicp(voxel=voxel))
+        rough = Gicp(voxel=_ROUGH * voxel, max_distances=(6.0 * voxel, 3.0 * voxel), neighbours=10, iterations=20)
+        ranked = best_first(own, starts, rough)
         return Pose(ranked[0].T, rivals=np.array([one.T for one in ranked[1:]]).reshape(-1, 4, 4))
 
     def _view(self, own: Scene, side: Side, T_level_cloud: Array, voxel: float) -> FromAbove:
@@ -102,21 +103,21 @@ class BirdsEye(Stage):
             cell=_COARSE * voxel,
             step_deg=_YAW_STEP_DEG,
             farthest=self.farthest * voxel,
-            most=_PEAKS,
+            most=_PEAKS * self.tries,
+            share=_SHARE,
         )
         found = climb(
             source, target, peaks, cell=voxel, step_deg=0.4 * _YAW_STEP_DEG, step=0.5 * _COARSE * voxel
         )
-        kept = found.score >= _SHARE * found.score[0]
-        return _matrices(found, kept, self.tries)
+        return _matrices(found, self.tries)
 
 
 _SIDES: tuple[Side, Side] = ("source", "target")
 
 
-def _matrices(found: Planar, kept: NDArray[np.bool_], most: int) -> list[Array]:
+def _matrices(found: Planar, most: int) -> list[Array]:
     poses = []
-    for yaw, shift in zip(found.yaw[kept][:most], found.shift[kept][:most], strict=True):
+    for yaw, shift in zip(found.yaw[:most], found.shift[:most], strict=True):
         T = se3.yaw(float(np.degrees(yaw)))
         T[:2, 3] = shift.real, shift.imag
         poses.append(T)

@@ -25,7 +25,10 @@ _SAME_CELLS, _SAME_DEG = 2.0, 3.0
 def climb(
     source: FromAbove, target: FromAbove, start: Planar, *, cell: float, step_deg: float, step: float
 ) -> Planar:
-    """Better poses near each of `start`, the best first.
+    """Better poses near each of `start`, in the same order and with the same scores, less those that meet.
+
+    The coarse map ranks poses better than the fine one, which asks more of levelling and of equal sampling than two
+    different sensors give; so the fine one only says where exactly.
 
     Parameters
     ----------
@@ -39,7 +42,7 @@ def climb(
     table = blurred(signed(target, 1.0, n, cell))
     every = max(1, -(-len(source.filled.layer) // _MOST_COLUMNS))
     places, layer = source.filled.places[::every], source.filled.layer[::every]
-    yaw, shift, score = start
+    yaw, shift = start.yaw, start.shift
     rows = np.arange(len(yaw))
     for move in range(_MOVES):
         size = 0.5**move
@@ -47,18 +50,18 @@ def climb(
         shifts = shift[:, None] + size * step * (_NEIGHBOURS[:, 1] + 1j * _NEIGHBOURS[:, 2])
         scores = _scores(table, places / cell, layer, yaws, shifts / cell)
         best = np.argmax(scores, axis=1)
-        yaw, shift, score = yaws[rows, best], shifts[rows, best], scores[rows, best]
-    return _distinct(Planar(yaw, shift, score), _SAME_CELLS * cell)
+        yaw, shift = yaws[rows, best], shifts[rows, best]
+    return _distinct(Planar(yaw, shift, start.score), _SAME_CELLS * cell)
 
 
 def _distinct(found: Planar, apart: float) -> Planar:
-    # Best first, without those that came out beside a better one.
+    # Without those that came out beside an earlier one.
     kept: list[int] = []
-    for one in np.argsort(-found.score, kind="stable"):
+    for one in range(len(found.score)):
         turn = np.angle(np.exp(1j * (found.yaw[kept] - found.yaw[one])))
         near = (np.abs(turn) < np.radians(_SAME_DEG)) & (np.abs(found.shift[kept] - found.shift[one]) < apart)
         if not near.any():
-            kept.append(int(one))
+            kept.append(one)
     return Planar(*(column[kept] for column in found))
 
 
@@ -72,5 +75,6 @@ def _scores(
     i, j = np.floor(turned.real).astype(np.int32), np.floor(turned.imag).astype(np.int32)
     known = (np.maximum(np.abs(i), np.abs(j)) < half - 1)
     flat = (layer * n + i % n) * n + j % n
-    scores: Array = np.where(known, table.ravel()[flat], 0.0).mean(axis=-1, dtype=np.float64)
+    evidence = np.where(known, table.ravel()[flat], np.float32(0.0))
+    scores: Array = evidence.mean(axis=-1, dtype=np.float64)
     return scores

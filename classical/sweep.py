@@ -28,7 +28,7 @@ class Planar(NamedTuple):
 
 
 def sweep(
-    source: FromAbove, target: FromAbove, *, cell: float, step_deg: float, farthest: float, most: int
+    source: FromAbove, target: FromAbove, *, cell: float, step_deg: float, farthest: float, most: int, share: float
 ) -> Planar:
     """Peaks of the correlation of two signed maps: filled columns count +1, free ones a little below zero.
 
@@ -42,6 +42,8 @@ def sweep(
         Largest shift, metres.
     most : int
         Peaks returned, at most.
+    share : float
+        Of the best one's score that a peak needs.
     """
     from scipy import fft
 
@@ -61,7 +63,7 @@ def sweep(
             best[sector][better] = score[better]
             at[sector][better] = yaw
     best[:, beyond] = -np.inf
-    return _peaks(best, at, place, most)
+    return _peaks(best, at, place, most, share)
 
 
 def _extent(view: FromAbove) -> float:
@@ -69,12 +71,13 @@ def _extent(view: FromAbove) -> float:
     return 2.0 * float(np.abs(view.filled.places).max(initial=0.0)) / np.sqrt(2.0)
 
 
-def _peaks(best: Floats, at: Array, place: Array, most: int) -> Planar:
+def _peaks(best: Floats, at: Array, place: Array, most: int, share: float) -> Planar:
     from scipy.ndimage import maximum_filter
 
     peak = (best == maximum_filter(best, (1, 3, 3), mode="wrap")) & np.isfinite(best)
     sector, i, j = np.nonzero(peak)
     score = best[sector, i, j].astype(np.float64)
     first = np.argsort(-score, kind="stable")[:most]
+    first = first[score[first] >= share * score[first[:1]]]
     sector, i, j = sector[first], i[first], j[first]
     return Planar(at[sector, i, j], place[i] + 1j * place[j], score[first])
