@@ -83,8 +83,10 @@ class BirdsEye(Stage):
         if any(len(view.filled.layer) == 0 for view in views):
             scene.note("bird's-eye search: nothing stands on the ground")
             return Pose.unknown()
-        starts = [se3.inverse(frames[1]) @ M @ frames[0] for M in self._planar(*views, voxel)]
-        rough = Gicp(voxel=_ROUGH * voxel, max_distances=(6.0 * voxel, 3.0 * voxel), neighbours=10, iterations=20)
+        starts = [se3.inverse(frames[1]) @ M @ frames[0] for M in self._planar(views[0], views[1], voxel)]
+        rough = Gicp(
+            voxel=_ROUGH * voxel, max_distances=(6.0 * voxel, 3.0 * voxel), neighbours=10, iterations=20
+        )
         ranked = best_first(own, starts, rough)
         return Pose(ranked[0].T, rivals=np.array([one.T for one in ranked[1:]]).reshape(-1, 4, 4))
 
@@ -127,7 +129,8 @@ def _matrices(found: Planar, most: int) -> list[Array]:
 def _default_voxel(scene: Scene) -> float:
     clouds = (scene.pair.source.points, scene.pair.target.points)
     reach = max(
-        float(np.quantile(np.linalg.norm(points - np.median(points, axis=0), axis=1), 0.99)) for points in clouds
+        float(np.quantile(np.linalg.norm(points - np.median(points, axis=0), axis=1), 0.99))
+        for points in clouds
     )
     return min(_VOXEL, float(f"{reach / _ALONG_REACH:.2g}")) or _VOXEL
 

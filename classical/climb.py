@@ -66,14 +66,18 @@ def _distinct(found: Planar, apart: float) -> Planar:
 
 
 def _scores(
-    table: Floats, places: NDArray[np.complex128], layer: NDArray[np.int64], yaws: Array, shifts: NDArray[np.complex128]
+    table: Floats,
+    places: NDArray[np.complex128],
+    layer: NDArray[np.int64],
+    yaws: Array,
+    shifts: NDArray[np.complex128],
 ) -> Array:
     # Mean evidence of the target at the source's columns, (k, 27). Beyond the map nothing is known.
     n = table.shape[1]
     half = n // 2
     turned = np.exp(1j * yaws)[..., None] * places + shifts[..., None]
     i, j = np.floor(turned.real).astype(np.int32), np.floor(turned.imag).astype(np.int32)
-    known = (np.maximum(np.abs(i), np.abs(j)) < half - 1)
+    known = np.maximum(np.abs(i), np.abs(j)) < half - 1
     flat = (layer * n + i % n) * n + j % n
     evidence = np.where(known, table.ravel()[flat], np.float32(0.0))
     scores: Array = evidence.mean(axis=-1, dtype=np.float64)

@@ -62,7 +62,9 @@ def _find(level: Level) -> Ground | None:
     found = [_fitted(points, weights, up, float(h), thick) for up, h in zip(ups, heights, strict=True)]
     if not found:
         return None
-    scores = _scores(points, weights, np.array([g.up for g in found]), np.array([g.height for g in found]), thick)
+    scores = _scores(
+        points, weights, np.array([g.up for g in found]), np.array([g.height for g in found]), thick
+    )
     best_one = int(np.argmax(scores))
     if scores[best_one] < _LEAST:
         return None

@@ -28,7 +28,14 @@ class Planar(NamedTuple):
 
 
 def sweep(
-    source: FromAbove, target: FromAbove, *, cell: float, step_deg: float, farthest: float, most: int, share: float
+    source: FromAbove,
+    target: FromAbove,
+    *,
+    cell: float,
+    step_deg: float,
+    farthest: float,
+    most: int,
+    share: float,
 ) -> Planar:
     """Peaks of the correlation of two signed maps: filled columns count +1, free ones a little below zero.
 
@@ -48,7 +55,7 @@ def sweep(
     from scipy import fft
 
     n = fft.next_fast_len(int(np.ceil((_extent(source) + _extent(target) + 2.0 * cell) / cell)), real=True)
-    place = cell * np.fft.fftfreq(n, 1.0 / n)
+    place: Array = cell * np.fft.fftfreq(n, 1.0 / n).astype(np.float64)
     beyond = np.hypot(place[:, None], place) > farthest
     spectrum = fft.rfft2(blurred(signed(target, 1.0, n, cell)), workers=n_threads())
     yaws = np.arange(0.0, 2.0 * np.pi, np.radians(step_deg))

@@ -51,6 +51,8 @@ class Terrain:
 
     def at(self, xy: Array) -> Array:
         """Height (n,) of the ground at places (n, 2), metres; beyond the map that of its border."""
-        i, j = np.clip(((xy - self.corner) / self.cell).astype(np.int64), 0, np.array(self.heights.shape) - 1).T
+        i, j = np.clip(
+            ((xy - self.corner) / self.cell).astype(np.int64), 0, np.array(self.heights.shape) - 1
+        ).T
         height: Array = self.heights[i, j]
         return height
