@@ -8,16 +8,21 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from hybridreg.normals import surface
+from hybridreg.resolution import reach
 from hybridreg.scene import Level, Scene
 
 Array = NDArray[np.float64]
+Weights = NDArray[np.float64]
 
-# Points that face up within 25 degrees may be ground; it must hold a tenth of the cloud, with a tenth below at most.
-_FACES_UP = float(np.cos(np.radians(25.0)))
-_LEAST, _MOST_BELOW = 0.1, 0.1
-# Half the thickness of the ground, in spacings.
-_THICK = 1.5
+# Half the thickness of the ground, as a plane follows uneven ground only so well: metres, yet no more than so much of
+# the cloud's reach (rooms), and no less than so many spacings.
+_THICK, _OF_REACH, _SPACINGS = 0.25, 0.03, 0.6
+# Triples of points tried; how many look best on few points; how many of these are fitted on all.
+_TRIPLES, _LOOKED_AT, _FITTED = 4000, 120, 6
+_FEW, _MANY = 160, 1500
+# Least share of the cloud on the ground less what lies below it. A steep plane, or one far from the sensor, is a
+# wall more often than a ground. A sensor hangs more often upright than on its head.
+_LEAST, _STEEP_DEG, _FAR_METRES, _UPTURNED = 0.1, 40.0, 5.0, 0.9
 
 
 class Ground(NamedTuple):
@@ -32,38 +37,76 @@ class Ground(NamedTuple):
 
 
 def find(scene: Scene, side: Literal["source", "target"]) -> Ground | None:
-    """Ground of one level, or None where no plane below the sensor carries enough of the points."""
-    return scene.shared(("ground", side), lambda: _find(scene, side))
+    """Ground of one level, or None where no plane below the sensor carries enough of the points.
+
+    A search over planes through three points of the level, with a seed of its own: the one that holds most points,
+    with few below it, near points counting more (far ground rises and falls). The sensor may hang in any way;
+    where two planes compete, the one under an upright sensor wins.
+    """
+    return scene.shared(("ground", side), lambda: _find(getattr(scene, side)))
 
 
-def _find(scene: Scene, side: Literal["source", "target"]) -> Ground | None:
-    level: Level = getattr(scene, side)
+def _find(level: Level) -> Ground | None:
     viewpoint = level.viewpoint
-    if viewpoint is None:
+    if viewpoint is None or len(level) < 3:
         return None
-    normals, planarity = surface(scene, side)
-    _, axes = np.linalg.eigh((normals * planarity[:, None]).T @ normals)
-    # Walls may outnumber the ground: the commonest direction is tried first, then the others.
-    for axis in axes.T[::-1]:
-        for up in (axis, -axis):
-            ground = _under(level, viewpoint, normals, up)
-            if ground is not None:
-                return ground
-    return None
+    rng = np.random.default_rng(0)
+    points = level.points[rng.permutation(len(level))[: 4 * _MANY]] - viewpoint
+    weights = _nearer_more(points)
+    thick = max(_SPACINGS * level.spacing, min(_THICK, _OF_REACH * reach(points)))
+    ups, heights = _planes(points, rng)
+    for n, kept in ((_FEW, _LOOKED_AT), (_MANY, _FITTED)):
+        scores = _scores(points[:n], weights[:n], ups, heights, thick)
+        best = np.argsort(-scores, kind="stable")[:kept]
+        ups, heights = ups[best], heights[best]
+    found = [_fitted(points, weights, up, float(h), thick) for up, h in zip(ups, heights, strict=True)]
+    if not found:
+        return None
+    scores = _scores(
+        points, weights, np.array([g.up for g in found]), np.array([g.height for g in found]), thick
+    )
+    best_one = int(np.argmax(scores))
+    if scores[best_one] < _LEAST:
+        return None
+    up, height = found[best_one]
+    return Ground(up, height + float(up @ viewpoint))
 
 
-def _under(level: Level, viewpoint: Array, normals: Array, up: Array) -> Ground | None:
-    along = level.points @ up
-    floor = along[np.abs(normals @ up) > _FACES_UP]
-    floor = floor[floor < viewpoint @ up]
-    if len(floor) < _LEAST * len(along):
-        return None
-    # The fullest layer as thick as the ground.
-    layer = 2.0 * _THICK * level.spacing
-    lowest = np.sort(floor)
-    held = np.searchsorted(lowest, lowest + layer) - np.arange(len(lowest))
-    first = int(np.argmax(held))
-    height = float(np.median(lowest[first : first + held[first]]))
-    if held[first] < _LEAST * len(along) or np.mean(along < height - layer) > _MOST_BELOW:
-        return None
+def _nearer_more(points: Array) -> Weights:
+    square = np.sum(points**2, axis=1)
+    weights = 1.0 / (1.0 + square / max(float(np.median(square)), 1e-30))
+    return weights / weights.sum()
+
+
+def _planes(points: Array, rng: np.random.Generator) -> tuple[Array, Array]:
+    # Planes through three points, their normals towards the sensor, which is the origin.
+    a, b, c = points[rng.integers(0, len(points), (3, _TRIPLES))]
+    normals = np.cross(b - a, c - a)
+    length = np.linalg.norm(normals, axis=1)
+    good = length > 1e-12 * np.max(length, initial=1e-30)
+    ups = normals[good] / length[good, None]
+    heights = np.einsum("ni,ni->n", ups, a[good])
+    above = np.where(heights > 0.0, -1.0, 1.0)
+    return ups * above[:, None], heights * above
+
+
+def _scores(points: Array, weights: Weights, ups: Array, heights: Array, thick: float) -> Weights:
+    above = (ups @ points.T - heights[:, None]) / thick  # (B, n)
+    weights = weights / weights.sum()
+    share = (np.abs(above) < 1.0) @ weights - (above < -2.0) @ weights
+    likely = np.where(np.abs(ups[:, 2]) < np.cos(np.radians(_STEEP_DEG)), 0.4, 1.0)
+    likely *= np.where(-heights > _FAR_METRES, 0.5, 1.0)
+    return share * likely * np.where(ups[:, 2] < 0.0, _UPTURNED, 1.0)
+
+
+def _fitted(points: Array, weights: Weights, up: Array, height: float, thick: float) -> Ground:
+    for width in (2.0, 1.0, 1.0):
+        on = np.abs(points @ up - height) < width * thick
+        if np.count_nonzero(on) < 3:
+            break
+        centre = np.average(points[on], axis=0, weights=weights[on])
+        centred = points[on] - centre
+        normal = np.linalg.eigh((weights[on, None] * centred).T @ centred)[1][:, 0]
+        up = normal if normal @ centre < 0.0 else -normal
+        height = float(up @ centre)
     return Ground(up, height)

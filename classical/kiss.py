@@ -9,11 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from hybridreg.classical.gicp import Gicp
+from hybridreg.classical.candidates import best_first
 from hybridreg.classical.voxel import voxel_centroids
-from hybridreg.fitness import measure
 from hybridreg.matches import Correspondences, Pose
-from hybridreg.normals import tree
 from hybridreg.resources import n_threads
 from hybridreg.scene import Scene
 from hybridreg.stage import Stage
@@ -51,8 +49,8 @@ class KissMatcher(Stage):
         if not found:
             scene.note("KISS-Matcher found no pose at any voxel size")
             return Pose.unknown()
-        best_first = sorted(found, key=lambda T: -_overlap_after_gicp(scene, T)) if len(found) > 1 else found
-        return Pose(best_first[0], rivals=np.array(best_first[1:]).reshape(-1, 4, 4))
+        ranked = [one.start for one in best_first(scene, found)] if len(found) > 1 else found
+        return Pose(ranked[0], rivals=np.array(ranked[1:]).reshape(-1, 4, 4))
 
     def _at(self, scene: Scene, voxel: float) -> Array | None:
         try:
@@ -90,8 +88,3 @@ def _describable(points: Array, voxel: float) -> bool:
         points, _NORMAL_RADIUS * voxel, return_length=True, workers=n_threads()
     )
     return int(np.count_nonzero(counts >= _NEIGHBOURS)) >= _SUPPORTED_POINTS
-
-
-def _overlap_after_gicp(scene: Scene, T: Array) -> float:
-    refined = Gicp()(scene, Pose(T)).T
-    return measure(scene.source.points, tree(scene, "target"), refined, 1.25 * scene.spacing).fitness

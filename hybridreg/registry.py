@@ -30,6 +30,7 @@ BUILT_IN = {
     "estimate.svd": "hybridreg.classical.svd:WeightedSvd",
     "estimate.fgr": "hybridreg.classical.fgr:Fgr",
     "estimate.kiss": "hybridreg.classical.kiss:KissMatcher",
+    "estimate.birdseye": "hybridreg.classical.birdseye:BirdsEye",
     "estimate.lgr": "hybridreg.learned.stages.lgr:Lgr",
     "refine.none": "hybridreg.classical.nothing:NoRefinement",
     "refine.icp": "hybridreg.classical.icp:Icp",

@@ -247,7 +247,9 @@ def test_an_unregistered_stage_is_not_written_to_a_file(tmp_path: Path) -> None:
     assert not list(tmp_path.iterdir())
 
 
-@pytest.mark.parametrize("name", ["icp", "fpfh-ransac", "fpfh-ransac-gicp", "fpfh-fgr-gicp", "kiss-gicp"])
+@pytest.mark.parametrize(
+    "name", ["icp", "fpfh-ransac", "fpfh-ransac-gicp", "fpfh-fgr-gicp", "kiss-gicp", "birdseye-gicp"]
+)
 def test_presets_build_pickle_and_clone(name: str) -> None:
     pipe = hr.Pipeline.preset(name, voxel=0.5)
     assert pickle.loads(pickle.dumps(pipe)) == pipe

@@ -1,0 +1,164 @@
+# SPDX-License-Identifier: MIT
+"""Pose from above: both clouds levelled by their ground, laid on one another at every yaw and shift."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hybridreg import se3
+from hybridreg.classical import ground
+from hybridreg.classical.candidates import best_first
+from hybridreg.classical.climb import climb
+from hybridreg.classical.columns import FromAbove, from_above
+from hybridreg.classical.gicp import Gicp
+from hybridreg.classical.ground import Ground
+from hybridreg.classical.sweep import Planar, sweep
+from hybridreg.classical.voxel import VoxelGrid
+from hybridreg.matches import Correspondences, Pose
+from hybridreg.scene import Scene
+from hybridreg.stage import Stage
+
+Array = NDArray[np.float64]
+Side = Literal["source", "target"]
+
+# Outdoors; in a room, so many voxels along the distance within which all but a hundredth of the points lie.
+_VOXEL, _ALONG_REACH = 0.5, 60.0
+# In voxels: the coarse map's cell, the grid on which GICP refines the candidates, how far from the sensor points
+# are used.
+_COARSE, _ROUGH, _REACH = 3.0, 1.6, 200.0
+# Degrees between yaws; peaks for each pose that is refined, as some meet; the share of the best one's score they need.
+_YAW_STEP_DEG, _PEAKS, _SHARE = 4.0, 3, 0.75
+
+
+@dataclass(frozen=True, kw_only=True)
+class BirdsEye(Stage):
+    """Search all yaws and shifts on the ground, for sensors whose tilt the ground tells.
+
+    Both clouds are levelled by their ground (`hybridreg.classical.ground`) and seen from above in layers of height.
+    Columns with points count for a pose where they meet, columns that one sensor looked through and the other
+    filled count a little against it. The correlation is computed by FFT for every yaw on a coarse grid, its best
+    peaks are improved on a fine one, and the best of these are refined by GICP and ranked by overlap. The height
+    follows from the two ground planes. The pose returned is the refined one; the others come back as `rivals`.
+
+    Where a cloud shows no ground, its sensor is taken to stand upright (or on its head, if the other one does) and
+    its lowest points to be the ground; a note says so.
+
+    Parameters
+    ----------
+    voxel : float or None
+        Resolution, metres; None takes 0.5, less where the clouds reach less than 30 m.
+    layers : tuple of float
+        Borders of the height layers over the ground, in voxels, rising.
+    farthest : float
+        Largest distance between the sensors along the ground, in voxels.
+    tries : int
+        Poses refined by GICP, at most.
+    """
+
+    voxel: float | None = None
+    layers: tuple[float, ...] = (0.6, 2.0, 4.0, 8.0, 20.0)
+    farthest: float = 120.0
+    tries: int = 5
+
+    def __post_init__(self) -> None:
+        if self.voxel is not None and not 0.0 < self.voxel < np.inf:
+            raise ValueError(f"voxel={self.voxel} must be a positive length in metres")
+        if len(self.layers) < 2 or not (np.diff(self.layers) > 0.0).all():
+            raise ValueError(f"layers={self.layers} must be two or more rising heights in voxels")
+        if not 0.0 < self.farthest < np.inf:
+            raise ValueError(f"farthest={self.farthest} must be a positive number of voxels")
+        if self.tries < 1:
+            raise ValueError(f"tries={self.tries} must be at least 1")
+
+    def __call__(self, scene: Scene, matches: Correspondences, rng: np.random.Generator) -> Pose:
+        voxel = self.voxel or _default_voxel(scene)
+        own = VoxelGrid(voxel=voxel)(scene.pair)
+        grounds = _grounds(own, scene)
+        frames = [_level_frame(g) for g in grounds]
+        views = [self._view(own, side, frame, voxel) for side, frame in zip(_SIDES, frames, strict=True)]
+        if any(len(view.filled.layer) == 0 for view in views):
+            scene.note("bird's-eye search: nothing stands on the ground")
+            return Pose.unknown()
+        starts = [se3.inverse(frames[1]) @ M @ frames[0] for M in self._planar(views[0], views[1], voxel)]
+        rough = Gicp(
+            voxel=_ROUGH * voxel, max_distances=(6.0 * voxel, 3.0 * voxel), neighbours=10, iterations=20
+        )
+        ranked = best_first(own, starts, rough)
+        return Pose(ranked[0].T, rivals=np.array([one.T for one in ranked[1:]]).reshape(-1, 4, 4))
+
+    def _view(self, own: Scene, side: Side, T_level_cloud: Array, voxel: float) -> FromAbove:
+        level = getattr(own, side)
+        points = se3.apply(T_level_cloud, level.points)
+        eye = None if level.viewpoint is None else se3.apply(T_level_cloud, level.viewpoint[None])[0]
+        centre = np.median(points, axis=0) if eye is None else eye
+        near = np.hypot(*(points - centre)[:, :2].T) < _REACH * voxel
+        return from_above(points[near], eye, tuple(voxel * edge for edge in self.layers), voxel)
+
+    def _planar(self, source: FromAbove, target: FromAbove, voxel: float) -> list[Array]:
+        peaks = sweep(
+            source,
+            target,
+            cell=_COARSE * voxel,
+            step_deg=_YAW_STEP_DEG,
+            farthest=self.farthest * voxel,
+            most=_PEAKS * self.tries,
+            share=_SHARE,
+        )
+        found = climb(
+            source, target, peaks, cell=voxel, step_deg=0.4 * _YAW_STEP_DEG, step=0.5 * _COARSE * voxel
+        )
+        return _matrices(found, self.tries)
+
+
+_SIDES: tuple[Side, Side] = ("source", "target")
+
+
+def _matrices(found: Planar, most: int) -> list[Array]:
+    poses = []
+    for yaw, shift in zip(found.yaw[:most], found.shift[:most], strict=True):
+        T = se3.yaw(float(np.degrees(yaw)))
+        T[:2, 3] = shift.real, shift.imag
+        poses.append(T)
+    return poses
+
+
+def _default_voxel(scene: Scene) -> float:
+    clouds = (scene.pair.source.points, scene.pair.target.points)
+    reach = max(
+        float(np.quantile(np.linalg.norm(points - np.median(points, axis=0), axis=1), 0.99))
+        for points in clouds
+    )
+    return min(_VOXEL, float(f"{reach / _ALONG_REACH:.2g}")) or _VOXEL
+
+
+def _grounds(own: Scene, scene: Scene) -> list[Ground]:
+    found = {side: ground.find(own, side) for side in _SIDES}
+    for side, other in zip(_SIDES, reversed(_SIDES), strict=True):
+        if found[side] is None:
+            known = found[other]
+            head_down = known is not None and known.up[2] < 0.0
+            scene.note(
+                f"bird's-eye search: no ground found in the {side}; its sensor is taken to "
+                f"{'hang on its head, as the other does' if head_down else 'stand upright'}"
+            )
+            found[side] = _assumed(getattr(own, side).points, -1.0 if head_down else 1.0)
+    return [g for g in found.values() if g is not None]
+
+
+def _assumed(points: Array, sign: float) -> Ground:
+    up = np.array([0.0, 0.0, sign])
+    return Ground(up, float(np.quantile(points @ up, 0.02)))
+
+
+def _level_frame(g: Ground) -> Array:
+    # The shortest turn that brings `up` to z, then the ground to z = 0.
+    z = np.array([0.0, 0.0, 1.0])
+    axis = np.cross(g.up, z)
+    sine, cosine = float(np.linalg.norm(axis)), float(g.up @ z)
+    direction = axis / sine if sine > 1e-9 else np.array([1.0, 0.0, 0.0])
+    R = se3.rotation_about(np.arctan2(sine, cosine) * direction)
+    return se3.from_rt(R, np.array([0.0, 0.0, -g.height]))

@@ -1,0 +1,90 @@
+# SPDX-License-Identifier: MIT
+"""Where and how turned does one cloud, seen from above, fit another? All yaws, all shifts, by FFT."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hybridreg.classical.columns import FromAbove
+from hybridreg.classical.signed import blurred, signed
+from hybridreg.resources import n_threads
+
+Array = NDArray[np.float64]
+Floats = NDArray[np.float32]
+
+# Yaws transformed at once, and the sectors in which a place keeps a best yaw of its own (a street turned round).
+_BATCH, _SECTORS = 4, 4
+
+
+class Planar(NamedTuple):
+    """Poses on the ground: yaw (k,) radians, shift (k,) complex metres, score (k,), the best first."""
+
+    yaw: Array
+    shift: NDArray[np.complex128]
+    score: Array
+
+
+def sweep(
+    source: FromAbove,
+    target: FromAbove,
+    *,
+    cell: float,
+    step_deg: float,
+    farthest: float,
+    most: int,
+    share: float,
+) -> Planar:
+    """Peaks of the correlation of two signed maps: filled columns count +1, free ones a little below zero.
+
+    Parameters
+    ----------
+    cell : float
+        Edge of a map's cell, metres.
+    step_deg : float
+        Between yaws.
+    farthest : float
+        Largest shift, metres.
+    most : int
+        Peaks returned, at most.
+    share : float
+        Of the best one's score that a peak needs.
+    """
+    from scipy import fft
+
+    n = fft.next_fast_len(int(np.ceil((_extent(source) + _extent(target) + 2.0 * cell) / cell)), real=True)
+    place: Array = cell * np.fft.fftfreq(n, 1.0 / n).astype(np.float64)
+    beyond = np.hypot(place[:, None], place) > farthest
+    spectrum = fft.rfft2(blurred(signed(target, 1.0, n, cell)), workers=n_threads())
+    yaws = np.arange(0.0, 2.0 * np.pi, np.radians(step_deg))
+    best = np.full((_SECTORS, n, n), -np.inf, dtype=np.float32)
+    at = np.zeros((_SECTORS, n, n))
+    for batch in np.array_split(yaws, -(-len(yaws) // _BATCH)):
+        turned = np.stack([signed(source, np.exp(1j * yaw), n, cell) for yaw in batch])
+        product = (np.conj(fft.rfft2(turned, workers=n_threads())) * spectrum).sum(axis=1)
+        for yaw, score in zip(batch, fft.irfft2(product, s=(n, n), workers=n_threads()), strict=True):
+            sector = int(_SECTORS * yaw / (2.0 * np.pi))
+            better = score > best[sector]
+            best[sector][better] = score[better]
+            at[sector][better] = yaw
+    best[:, beyond] = -np.inf
+    return _peaks(best, at, place, most, share)
+
+
+def _extent(view: FromAbove) -> float:
+    # Twice the greatest distance of a filled column, whatever the yaw.
+    return 2.0 * float(np.abs(view.filled.places).max(initial=0.0)) / np.sqrt(2.0)
+
+
+def _peaks(best: Floats, at: Array, place: Array, most: int, share: float) -> Planar:
+    from scipy.ndimage import maximum_filter
+
+    peak = (best == maximum_filter(best, (1, 3, 3), mode="wrap")) & np.isfinite(best)
+    sector, i, j = np.nonzero(peak)
+    score = best[sector, i, j].astype(np.float64)
+    first = np.argsort(-score, kind="stable")[:most]
+    first = first[score[first] >= share * score[first[:1]]]
+    sector, i, j = sector[first], i[first], j[first]
+    return Planar(at[sector, i, j], place[i] + 1j * place[j], score[first])
