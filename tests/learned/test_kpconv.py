@@ -9,7 +9,7 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hybridreg.learned.blocks import PointGroupNorm, upsample
+from hybridreg.learned.blocks import PointGroupNorm, linear_on_joined, upsample
 from hybridreg.learned.group_norm import group_norm
 from hybridreg.learned.influence import find_links, kernel_influence
 from hybridreg.learned.kernel_points import kernel_points
@@ -123,6 +123,14 @@ def test_per_cloud_norm_ignores_the_other_cloud() -> None:
 def test_upsampling_a_shadow_gives_zeros() -> None:
     got = upsample(torch.ones(3, 2), torch.tensor([0, 3, 2]))
     assert got.tolist() == [[1, 1], [0, 0], [1, 1]]
+
+
+def test_linear_on_joined_equals_linear_after_joining() -> None:
+    layer = torch.nn.Linear(7, 4).double()
+    coarse, skip = torch.randn(3, 5, dtype=torch.float64), torch.randn(6, 2, dtype=torch.float64)
+    nearest = torch.tensor([0, 2, 3, 1, 1, 0])  # 3 is the shadow
+    want = layer(torch.cat([upsample(coarse, nearest), skip], dim=1))
+    assert torch.allclose(linear_on_joined(layer, coarse, nearest, skip), want)
 
 
 def test_kernel_points_are_spread() -> None:
