@@ -26,6 +26,7 @@ from hybridreg.learned.batch import Batch, make_batch
 from hybridreg.learned.config import NetworkConfig
 from hybridreg.learned.grid import grid_subsample
 from hybridreg.learned.lgr import local_to_global
+from hybridreg.learned.memory import forward_bytes
 from hybridreg.learned.network import RegistrationNetwork
 from hybridreg.learned.sizes import named_config
 
@@ -71,6 +72,11 @@ def peak_gb() -> float:
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6
 
 
+def resident_gb() -> float:
+    """Memory of this process now, GB (Linux)."""
+    return int(Path("/proc/self/statm").read_text().split()[1]) * resource.getpagesize() / 1e9
+
+
 def matrix_rate() -> float:
     """Multiply-adds a second of one large matrix product."""
     a = torch.randn(2048, 1024)
@@ -111,10 +117,13 @@ def report(config: NetworkConfig, n_points: int, repeats: int) -> None:
     print(f"pyramid {time.perf_counter() - start:.2f} s, stages {[sum(n) for n in batch.pyramid.lengths]}")
     torch.manual_seed(0)
     network = RegistrationNetwork(config).eval()
-    rate = matrix_rate()
+    held = resident_gb()
     with torch.no_grad():
         network(batch)
+        estimate = forward_bytes(batch.pyramid, config) / 1e9
+        print(f"forward's own peak {peak_gb() - held:.3f} GB, estimated {estimate:.3f} GB")
         print(f"peak memory {peak_gb():.2f} GB ({before:.2f} GB before pyramid and network)")
+        rate = matrix_rate()
         for name, call in parts(network, batch).items():
             wall, processor = timed(call, repeats)
             print(f"{name:36s} {wall:6.3f} s wall  {processor:6.3f} s processor")

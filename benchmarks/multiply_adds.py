@@ -9,8 +9,9 @@ from typing import Any
 import torch
 from torch import nn
 
-from hybridreg.learned import kpconv
+from hybridreg.learned.backbone import KpconvFpn
 from hybridreg.learned.batch import Batch
+from hybridreg.learned.kpconv import KPConv
 from hybridreg.learned.network import RegistrationNetwork
 from hybridreg.learned.patch_pairs import size_chunks
 from hybridreg.learned.structure_embedding import StructureEmbedding
@@ -39,12 +40,21 @@ def _counter(counted: Counter[str], module: nn.Module) -> Any:
         counted["linear layers"] += out.numel() * module.in_features
 
     def convolution(_: nn.Module, args: tuple[Any, ...], out: torch.Tensor) -> None:
-        assert isinstance(module, kpconv.KPConv)
+        assert isinstance(module, KPConv)
         _, neighbors, influence = args
         n_kernel, dim_in, dim_out = module.weights.shape
         counted["KPConv, gathering"] += sum(len(bags.index) for bags in influence.bags) * dim_in
         counted["KPConv, products"] += len(neighbors) * n_kernel * dim_in * dim_out
         counted["KPConv, influences"] += int((neighbors < influence.bags[0].n_rows).sum()) * n_kernel * 4
+
+    def decoder(_: nn.Module, args: tuple[Any, ...], out: torch.Tensor) -> None:
+        assert isinstance(module, KpconvFpn)
+        lengths = [sum(both) for both in args[1].lengths]
+        for name, layer in module.decoder.items():
+            weight, stage = getattr(layer, "linear", layer).weight, int(name)
+            skip = module.config.init_dim * 2 ** (stage + 1)
+            joined = lengths[stage] * skip + lengths[stage + 1] * (weight.shape[1] - skip)
+            counted["linear layers"] += joined * len(weight)
 
     def image(_: nn.Module, args: tuple[Any, ...], out: torch.Tensor) -> None:
         assert isinstance(module, nn.Conv2d)
@@ -55,5 +65,11 @@ def _counter(counted: Counter[str], module: nn.Module) -> Any:
         # four samples of its curve for the distance of each pair and for each of its angles
         counted["structure embedding"] += out.numel() * 4 * (1 + min(module.angle_k, out.shape[0] - 1))
 
-    by_kind = {StructureEmbedding: structure, nn.Linear: linear, kpconv.KPConv: convolution, nn.Conv2d: image}
+    by_kind = {
+        StructureEmbedding: structure,
+        nn.Linear: linear,
+        KPConv: convolution,
+        KpconvFpn: decoder,
+        nn.Conv2d: image,
+    }
     return by_kind.get(type(module), lambda *_: None)  # type: ignore[call-overload]

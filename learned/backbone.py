@@ -6,10 +6,16 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-import torch
 from torch import Tensor, nn
 
-from hybridreg.learned.blocks import BlockPlan, ConvBlock, ResidualBlock, Surroundings, Unary, upsample
+from hybridreg.learned.blocks import (
+    BlockPlan,
+    ConvBlock,
+    ResidualBlock,
+    Surroundings,
+    Unary,
+    linear_on_joined,
+)
 from hybridreg.learned.config import BackboneConfig
 from hybridreg.learned.influence import find_links
 from hybridreg.learned.pyramid import Pyramid
@@ -59,9 +65,11 @@ class KpconvFpn(nn.Module):
             skips.append(features)
         coarse = features
         for stage in range(self.config.stages - 2, self.config.fine_stage - 2, -1):
-            joined = torch.cat([upsample(features, pyramid.upsampling[stage]), skips[stage]], dim=1)
             layer = self.decoder[str(stage)]
-            features = layer(joined, pyramid.lengths[stage]) if isinstance(layer, Unary) else layer(joined)
+            linear = layer.linear if isinstance(layer, Unary) else layer
+            features = linear_on_joined(linear, features, pyramid.upsampling[stage], skips[stage])
+            if isinstance(layer, Unary):
+                features = layer.normalize(features, pyramid.lengths[stage])
         return coarse, features
 
     def _encode_stage(self, features: Tensor, pyramid: Pyramid, stage: int, blocks: nn.ModuleList) -> Tensor:

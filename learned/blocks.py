@@ -62,7 +62,11 @@ class Unary(nn.Module):
 
     def forward(self, features: Tensor, lengths: tuple[int, int]) -> Tensor:
         """(N, C_in) to (N, C_out)."""
-        return self.norm(self.linear(features), lengths, _SLOPE if self.activate else 1.0)
+        return self.normalize(self.linear(features), lengths)
+
+    def normalize(self, features: Tensor, lengths: tuple[int, int]) -> Tensor:
+        """What follows the linear layer, (N, C_out) to (N, C_out)."""
+        return self.norm(features, lengths, _SLOPE if self.activate else 1.0)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -119,6 +123,16 @@ class ResidualBlock(nn.Module):
         if self.unary_shortcut is not None:
             shortcut = self.unary_shortcut(shortcut, around.lengths)
         return F.leaky_relu_(main + shortcut, _SLOPE)
+
+
+def linear_on_joined(layer: nn.Module, coarse: Tensor, nearest: Tensor, skip: Tensor) -> Tensor:
+    """A linear layer on upsampled coarse features (M, C) beside those of a skip (N, D), to (N, C_out).
+
+    The coarse part is multiplied before it is upsampled: there are fewer coarse points.
+    """
+    assert isinstance(layer, nn.Linear)
+    from_coarse, from_skip = layer.weight.split([coarse.shape[1], skip.shape[1]], dim=1)
+    return F.linear(skip, from_skip, layer.bias) + upsample(coarse @ from_coarse.t(), nearest)
 
 
 def upsample(features: Tensor, nearest: Tensor) -> Tensor:

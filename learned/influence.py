@@ -75,10 +75,9 @@ def kernel_influence(links: Links, kernel: Tensor, sigma: float) -> Influence:
     # |a - x|^2 as |a|^2 - 2 a.x + |x|^2: one product, no (E, K, 3) tensor. One kernel point at a time, so that
     # what is looked at stays in the cache.
     factors = torch.cat([-2.0 * kernel, torch.ones_like(kernel[:, :1])], dim=1)
-    constants = kernel.square().sum(1)
+    constants = kernel.square().sum(1).tolist()
     parts = [
-        _reached(links, factor, float(constant), sigma)
-        for factor, constant in zip(factors, constants, strict=True)
+        _reached(links, factor, constant, sigma) for factor, constant in zip(factors, constants, strict=True)
     ]
     return Influence(tuple(parts))
 

@@ -12,6 +12,10 @@ _MINUS_INFINITY = -1e12
 _TINY = 1e-38
 # Potentials that move farther than e^40 from their start leave too little of float32's range.
 _MAX_CHANGE = 40.0
+# No iteration moves log potentials farther than the one before (log-sum-exp is 1-Lipschitz): once they move by
+# less than this, a hundred more iterations change nothing above 5e-5.
+_SETTLED = 5e-7
+_CHECK_EVERY = 8
 
 
 class OptimalTransport(nn.Module):
@@ -55,7 +59,7 @@ def kernel_sinkhorn(scores: Tensor, rows: Tensor, columns: Tensor, alpha: Tensor
 
     The first iteration is done on logarithms and its potentials go into the kernel, which is then of the
     order of the marginals whatever the scores: only their change has to fit float32. The pairs for which it
-    does not are done again in the log form.
+    does not are done again in the log form. Iterations that would change nothing are left out.
     """
     if len(scores) == 0 or iterations < 2:
         return log_sinkhorn(scores, rows, columns, alpha, iterations)
@@ -65,9 +69,11 @@ def kernel_sinkhorn(scores: Tensor, rows: Tensor, columns: Tensor, alpha: Tensor
     # A row times a matrix is five times as fast as a matrix times a column: hence a transposed copy.
     transposed = kernel.transpose(1, 2).contiguous()
     u, v = torch.ones_like(mu), torch.ones_like(nu)  # (B, 1, n + 1), (B, 1, m + 1)
-    for _ in range(iterations - 1):
-        u = mu / torch.bmm(v, transposed).clamp_min(_TINY)
+    for step in range(1, iterations):
+        u, before = mu / torch.bmm(v, transposed).clamp_min(_TINY), v
         v = nu / torch.bmm(u, kernel).clamp_min(_TINY)
+        if step % _CHECK_EVERY == 0 and bool(((v - before).abs() <= _SETTLED * v).all()):
+            break
     log_u, log_v = torch.where(mu > 0, u, 1.0).log(), torch.where(nu > 0, v, 1.0).log()
     out = start + log_u.transpose(1, 2) + log_v
     lost = torch.maximum(log_u.abs().amax((1, 2)), log_v.abs().amax((1, 2))) > _MAX_CHANGE

@@ -8,6 +8,7 @@ import math
 import torch
 
 from hybridreg.learned.batch import Batch, make_batch
+from hybridreg.learned.memory import require_memory
 from hybridreg.learned.network import Encoding
 from hybridreg.learned.stages.network_stage import NetworkStage
 from hybridreg.scene import Scene
@@ -29,7 +30,9 @@ def _encode(scene: Scene, stage: NetworkStage) -> Encoding:
         why = "no image" if scene.pair.image is None else "the network was trained without images"
         scene.note(f"{why}: features come from the clouds alone, a learned token in the image's place")
     with torch.inference_mode():
-        return network.encode(_batch(scene, stage))
+        batch = _batch(scene, stage)
+        require_memory(batch.pyramid, network.config)
+        return network.encode(batch)
 
 
 def _batch(scene: Scene, stage: NetworkStage) -> Batch:

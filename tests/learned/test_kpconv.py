@@ -9,7 +9,7 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hybridreg.learned.blocks import PointGroupNorm, upsample
+from hybridreg.learned.blocks import PointGroupNorm, linear_on_joined, upsample
 from hybridreg.learned.group_norm import group_norm
 from hybridreg.learned.influence import find_links, kernel_influence
 from hybridreg.learned.kernel_points import kernel_points
@@ -72,15 +72,24 @@ def test_gradients_reach_features_and_weights(sigma: float) -> None:
 @given(st.integers(1, 12), st.integers(1, 5), st.integers(1, 4), st.integers(0, 10**6))
 def test_max_pool_equals_gathering(n: int, slots: int, width: int, seed: int) -> None:
     gen = torch.Generator().manual_seed(seed)
-    features = torch.randint(-2, 3, (n, width), generator=gen).double().requires_grad_()  # many ties
+    features = torch.randint(-2, 3, (n, width), generator=gen).double()  # many ties
     neighbors = torch.randint(0, n + 1, (n, slots), generator=gen)
-    padded = torch.cat([features, features.new_zeros(1, width)])
-    got, want = max_pool(features, neighbors), padded[neighbors].amax(1)
-    assert torch.equal(got, want)
-    upstream = torch.rand(got.shape, dtype=torch.float64, generator=gen)
-    assert torch.allclose(
-        torch.autograd.grad(got, features, upstream)[0], torch.autograd.grad(want, features, upstream)[0]
+    want = torch.cat([features, features.new_zeros(1, width)])[neighbors].amax(1)
+    assert torch.equal(max_pool(features, neighbors), want)
+    assert torch.equal(max_pool(features.requires_grad_(), neighbors), want)
+
+
+def test_max_pool_gradient_goes_to_the_maximum() -> None:
+    gen = torch.Generator().manual_seed(0)
+    features = torch.randn(40, 5, dtype=torch.float64, generator=gen).requires_grad_()
+    neighbors = torch.stack([torch.randperm(41, generator=gen)[:6] for _ in range(30)])
+    upstream = torch.rand(30, 5, dtype=torch.float64, generator=gen)
+    padded = torch.cat([features, features.new_zeros(1, 5)])
+    got, want = (
+        torch.autograd.grad(out, features, upstream)[0]
+        for out in (max_pool(features, neighbors), padded[neighbors].amax(1))
     )
+    assert torch.allclose(got, want)
 
 
 @pytest.mark.parametrize("n", [1, 2, 50])
@@ -114,6 +123,14 @@ def test_per_cloud_norm_ignores_the_other_cloud() -> None:
 def test_upsampling_a_shadow_gives_zeros() -> None:
     got = upsample(torch.ones(3, 2), torch.tensor([0, 3, 2]))
     assert got.tolist() == [[1, 1], [0, 0], [1, 1]]
+
+
+def test_linear_on_joined_equals_linear_after_joining() -> None:
+    layer = torch.nn.Linear(7, 4).double()
+    coarse, skip = torch.randn(3, 5, dtype=torch.float64), torch.randn(6, 2, dtype=torch.float64)
+    nearest = torch.tensor([0, 2, 3, 1, 1, 0])  # 3 is the shadow
+    want = layer(torch.cat([upsample(coarse, nearest), skip], dim=1))
+    assert torch.allclose(linear_on_joined(layer, coarse, nearest, skip), want)
 
 
 def test_kernel_points_are_spread() -> None:

@@ -50,6 +50,17 @@ def test_the_log_form_steps_in_for_single_pairs() -> None:
     assert (kernel_sinkhorn(scores, rows, columns, ALPHA, 50).exp() - exact).abs().max() < 1e-4
 
 
+def test_settled_potentials_stop_the_iteration(monkeypatch: pytest.MonkeyPatch) -> None:
+    scores, rows, columns = problem(4, 2.0)
+    products = []
+    bmm = torch.bmm
+    monkeypatch.setattr(torch, "bmm", lambda a, b: products.append(1) or bmm(a, b))  # type: ignore[func-returns-value]
+    early = kernel_sinkhorn(scores, rows, columns, ALPHA, 1000)
+    assert len(products) < 200
+    exact = log_sinkhorn(scores.double(), rows, columns, ALPHA.double(), 1000).exp()
+    assert (early.exp() - exact).abs().max() < 1e-5
+
+
 @pytest.mark.parametrize("form", ["log", "kernel"])
 def test_padding_changes_nothing(form: str) -> None:
     scores, rows, columns = problem(1, 10.0)

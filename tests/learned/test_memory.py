@@ -1,0 +1,67 @@
+# SPDX-License-Identifier: MIT
+"""The memory estimate beside what a forward pass really takes, and the refusal."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+import torch
+from streets import street
+
+from hybridreg.learned import memory
+from hybridreg.learned.pyramid import build_pyramid
+from hybridreg.learned.sizes import named_config
+
+_MEASURE = """
+import numpy as np, torch
+from hybridreg.learned.batch import make_batch
+from hybridreg.learned.memory import forward_bytes
+from hybridreg.learned.network import RegistrationNetwork
+from hybridreg.learned.sizes import named_config
+from hybridreg.resources import peak_memory_mb, reset_peak_memory
+config = named_config("nano")
+rng = np.random.default_rng(0)
+clouds = [rng.uniform(0, 70, (20000, 3)) * [1, 1, 0.02] for _ in range(2)]
+batch, network = make_batch(*clouds, config, subsample=False), RegistrationNetwork(config).eval()
+reset_peak_memory()
+before = peak_memory_mb()
+with torch.no_grad():
+    network(batch)
+print((peak_memory_mb() - before) * 2**20, forward_bytes(batch.pyramid, config))
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="peak memory is reset through /proc")
+def test_the_estimate_is_near_and_not_below() -> None:
+    # in a process of its own: this one holds freed memory that a forward pass would take first
+    printed = subprocess.run([sys.executable, "-c", _MEASURE], check=True, capture_output=True, text=True)
+    real, estimate = map(float, printed.stdout.split())
+    assert real <= estimate <= 1.5 * real
+
+
+def test_too_large_a_pair_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    config = named_config("nano")
+    clouds = [torch.from_numpy(street(seed, 300)) for seed in (1, 2)]
+    pyramid = build_pyramid(*clouds, config.backbone)
+    memory.require_memory(pyramid, config)
+    monkeypatch.setattr(memory, "available_bytes", lambda device: 10**6)
+    with pytest.raises(ValueError, match=r"300 target and 300 source points.*voxel larger than 0.5 m"):
+        memory.require_memory(pyramid, config)
+
+
+def test_the_machine_tells_what_is_free() -> None:
+    free = memory.available_bytes()
+    assert free is None or free > 2**20
+
+
+def test_more_points_take_more() -> None:
+    config = named_config("nano")
+    rng = np.random.default_rng(0)
+    sizes = []
+    for n in (100, 1000):
+        cloud = torch.from_numpy((rng.uniform(0, n**0.5, (n, 3)) * [1, 1, 0.02]).astype(np.float32))
+        sizes.append(memory.forward_bytes(build_pyramid(cloud, cloud, config.backbone), config))
+    assert sizes[0] < sizes[1]
