@@ -73,12 +73,13 @@ class KpconvFpn(nn.Module):
         return coarse, features
 
     def _encode_stage(self, features: Tensor, pyramid: Pyramid, stage: int, blocks: nn.ModuleList) -> Tensor:
-        plain = _plain(pyramid, stage)
+        cylindrical = self.config.kernel == "cylindrical"
+        plain = _plain(pyramid, stage, cylindrical)
         if self.config.shared_kernel_points:
             plain = _with_influence(plain, blocks[-1])
         for index, block in enumerate(blocks):
             strided = stage > 0 and index == 0
-            features = block(features, _strided(pyramid, stage) if strided else plain)
+            features = block(features, _strided(pyramid, stage, cylindrical) if strided else plain)
         return features
 
 
@@ -97,6 +98,7 @@ def _stage_plans(config: BackboneConfig, stage: int) -> list[BlockPlan]:
             groups=config.groups,
             per_cloud=config.norm_scope == "per_cloud",
             n_kernel=config.kernel_points,
+            cylindrical=config.kernel == "cylindrical",
             strided=strided,
         )
 
@@ -111,18 +113,21 @@ def _block(plan: BlockPlan, first: bool, rng: np.random.Generator | None) -> nn.
     return ConvBlock(plan, rng) if first else ResidualBlock(plan, rng)
 
 
-def _plain(pyramid: Pyramid, stage: int) -> Surroundings:
+def _plain(pyramid: Pyramid, stage: int, cylindrical: bool) -> Surroundings:
     points, lengths, neighbors = pyramid.points[stage], pyramid.lengths[stage], pyramid.neighbors[stage]
-    return Surroundings(neighbors, lengths, lengths, find_links(points, points, neighbors))
+    links = find_links(points, points, neighbors, cylindrical=cylindrical)
+    return Surroundings(neighbors, lengths, lengths, links)
 
 
-def _strided(pyramid: Pyramid, stage: int) -> Surroundings:
+def _strided(pyramid: Pyramid, stage: int, cylindrical: bool) -> Surroundings:
     neighbors = pyramid.subsampling[stage - 1]
     return Surroundings(
         neighbors,
         lengths=pyramid.lengths[stage],
         support_lengths=pyramid.lengths[stage - 1],
-        links=find_links(pyramid.points[stage], pyramid.points[stage - 1], neighbors),
+        links=find_links(
+            pyramid.points[stage], pyramid.points[stage - 1], neighbors, cylindrical=cylindrical
+        ),
     )
 
 

@@ -6,12 +6,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 import torch
 from torch import Tensor, nn
 from torch.nn import functional as F
 
 from hybridreg.learned.group_norm import group_norm
 from hybridreg.learned.influence import Influence, Links, kernel_influence
+from hybridreg.learned.kernel_points import cylindrical_kernel_points, kernel_points
 from hybridreg.learned.kpconv import KPConv
 from hybridreg.learned.max_pool import max_pool
 
@@ -80,7 +82,14 @@ class BlockPlan:
     groups: int
     per_cloud: bool
     n_kernel: int
+    cylindrical: bool = False
     strided: bool = False
+
+    def kernel(self, rng: np.random.Generator | None) -> npt.NDArray[np.float32]:
+        """(n_kernel, 3) kernel points in metres; ``rng`` turns spatial ones."""
+        if self.cylindrical:
+            return cylindrical_kernel_points(self.n_kernel, self.radius)
+        return kernel_points(self.n_kernel, self.radius, rng)
 
 
 class ConvBlock(nn.Module):
@@ -88,7 +97,7 @@ class ConvBlock(nn.Module):
 
     def __init__(self, plan: BlockPlan, rng: np.random.Generator | None) -> None:
         super().__init__()
-        self.conv = KPConv(plan.dim_in, plan.dim_out, plan.radius, plan.sigma, plan.n_kernel, rng)
+        self.conv = KPConv(plan.dim_in, plan.dim_out, plan.sigma, plan.kernel(rng))
         self.norm = PointGroupNorm(plan.dim_out, plan.groups, plan.per_cloud)
 
     def forward(self, features: Tensor, around: Surroundings) -> Tensor:
@@ -106,7 +115,7 @@ class ResidualBlock(nn.Module):
         middle = plan.dim_out // 4
         self.strided = plan.strided
         self.unary_in = Unary(plan.dim_in, middle, groups, per_cloud) if plan.dim_in != middle else None
-        self.conv = KPConv(middle, middle, plan.radius, plan.sigma, plan.n_kernel, rng)
+        self.conv = KPConv(middle, middle, plan.sigma, plan.kernel(rng))
         self.norm = PointGroupNorm(middle, groups, per_cloud)
         self.unary_out = Unary(middle, plan.dim_out, groups, per_cloud, activate=False)
         widens = plan.dim_in != plan.dim_out

@@ -27,6 +27,9 @@ class BackboneConfig:
     fine_stage: int = 2  # counted from 1: the stage whose points are matched
     kernel_points: int = 15
     shared_kernel_points: bool = False  # one kernel disposition a stage: influences are computed once
+    # Where a neighbour lies: in three dimensions as published, or by its distance from the vertical axis through
+    # the query and its height, which no turn about the vertical changes.
+    kernel: Literal["spatial", "cylindrical"] = "spatial"
     input_features: Literal["ones", "geometric"] = "ones"
     norm_scope: Literal["stacked", "per_cloud"] = "stacked"
 
@@ -69,7 +72,7 @@ class ImageConfig:
     stem_dim: int = 32
     widths: tuple[int, ...] = (32, 64, 96, 128, 160)  # after strides 2, 4, 8, 16, 32
     groups: int = 8
-    output_stride: Literal[2, 4, 8] = 8
+    output_stride: Literal[1, 2, 4, 8] = 8
     dropout: float = 0.1  # share of training steps that see the null token instead of the image
 
 

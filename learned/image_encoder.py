@@ -56,6 +56,7 @@ class ImageEncoder(nn.Module):
         for level in range(len(widths) - 2, _last_level(config) - 1, -1):
             self.up.append(ResidualConv(dim + widths[level], config.dim, groups))
             dim = config.dim
+        self.full = ResidualConv(dim + 3, dim, groups) if config.output_stride == 1 else None
         self.out = nn.Conv2d(dim, config.dim, 1)
         self.null = nn.Parameter(torch.randn(1, config.dim) * 0.02)
 
@@ -70,14 +71,21 @@ class ImageEncoder(nn.Module):
             features = block(features)
             skips.append(features)
         for block, skip in zip(self.up, reversed(skips[:-1]), strict=False):
-            larger = F.interpolate(features, size=skip.shape[-2:], mode="bilinear", align_corners=False)
-            features = block(torch.cat([larger, skip], dim=1))
+            features = _joined(block, features, skip)
+        if self.full is not None:
+            features = _joined(self.full, features, image[None])
         return ImageFeatures(self.out(features)[0], self.null)
 
 
+def _joined(block: nn.Module, features: Tensor, skip: Tensor) -> Tensor:
+    larger = F.interpolate(features, size=skip.shape[-2:], mode="bilinear", align_corners=False)
+    joined: Tensor = block(torch.cat([larger, skip], dim=1))
+    return joined
+
+
 def _last_level(config: ImageConfig) -> int:
-    # Level l of the encoder has stride 2 ** (l + 1).
-    level = config.output_stride.bit_length() - 2
+    # Level l of the encoder has stride 2 ** (l + 1); stride 1 is one block more, on the image itself.
+    level = max(config.output_stride.bit_length() - 2, 0)
     if level > len(config.widths) - 2:
         raise ValueError(f"output_stride {config.output_stride} is not finer than the encoder's last stage")
     return level

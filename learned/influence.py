@@ -24,12 +24,17 @@ class Links:
     local: Tensor  # (4, E): support minus query in metres, and its squared length
 
 
-def find_links(queries: Tensor, supports: Tensor, neighbors: Tensor) -> Links:
-    """Links of queries (N, 3) to supports (M, 3) by neighbours (N, k) int64, pad M."""
+def find_links(queries: Tensor, supports: Tensor, neighbors: Tensor, *, cylindrical: bool = False) -> Links:
+    """Links of queries (N, 3) to supports (M, 3) by neighbours (N, k) int64, pad M.
+
+    ``cylindrical`` folds each offset about the vertical axis, (x, y, z) to (sqrt(x^2 + y^2), 0, z).
+    """
     entry = _positions(neighbors.flatten(), len(supports))
     query = entry.div(max(1, neighbors.shape[1]), rounding_mode="floor")
     support = neighbors.flatten().index_select(0, entry)
     local = (supports.index_select(0, support) - queries.index_select(0, query)).t()
+    if cylindrical:
+        local = torch.stack([local[:2].norm(dim=0), torch.zeros_like(local[2]), local[2]])
     return Links(
         len(queries), len(supports), query, support, torch.cat([local, local.square().sum(0, keepdim=True)])
     )

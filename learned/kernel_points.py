@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Where the kernel points of a KPConv lie: spread in the unit ball by repulsion (methods 3.1)."""
+"""Where the kernel points of a KPConv lie: spread in the unit ball by repulsion (methods 3.1), or on half circles."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 _MEAN_RADIUS = 0.66
 _STEPS = 600
+_INNER, _OUTER = 0.45, 0.9  # radii of the half circles
 
 
 @lru_cache(maxsize=8)
@@ -59,3 +60,18 @@ def kernel_points(
         turned = points @ np.array([[cos, sin, 0.0], [-sin, cos, 0.0], [0.0, 0.0, 1.0]])
         points = turned + rng.normal(scale=0.01, size=points.shape)
     return (points * radius).astype(np.float32)
+
+
+def cylindrical_kernel_points(n_points: int, radius: float) -> npt.NDArray[np.float32]:
+    """Kernel points (n_points, 3) float32 in metres for offsets folded about the vertical axis, all with y = 0.
+
+    One in the middle, the others evenly on two half circles about it: a neighbour's place is its distance from
+    the axis and its height, so that the convolution does not change when a cloud turns about the vertical.
+    """
+    inner = round((n_points - 1) * _INNER / (_INNER + _OUTER))
+    places = [np.zeros((1, 2))]
+    for share, count in ((_INNER, inner), (_OUTER, n_points - 1 - inner)):
+        angle = np.linspace(-np.pi / 2, np.pi / 2, count)
+        places.append(share * np.column_stack([np.cos(angle), np.sin(angle)]))
+    across, up = (np.concatenate(places) * radius).T
+    return np.column_stack([across, np.zeros(n_points), up]).astype(np.float32)

@@ -7,12 +7,12 @@ import math
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 import torch
 from torch import Tensor, nn
 from torch.nn import functional as F
 
 from hybridreg.learned.influence import Influence
-from hybridreg.learned.kernel_points import kernel_points
 
 
 def kernel_point_convolution(
@@ -84,24 +84,19 @@ def _positive_neighbors(features: Tensor, neighbors: Tensor) -> Tensor:
 
 
 class KPConv(nn.Module):
-    """A kernel point convolution from ``dim_in`` to ``dim_out`` channels; ``radius``, ``sigma`` in metres."""
+    """A kernel point convolution from ``dim_in`` to ``dim_out`` channels.
+
+    ``points`` (K, 3) are the kernel points and ``sigma`` their reach, in metres.
+    """
 
     kernel: Tensor
 
-    def __init__(
-        self,
-        dim_in: int,
-        dim_out: int,
-        radius: float,
-        sigma: float,
-        n_kernel: int,
-        rng: np.random.Generator | None,
-    ) -> None:
+    def __init__(self, dim_in: int, dim_out: int, sigma: float, points: npt.NDArray[np.float32]) -> None:
         super().__init__()
         self.sigma = sigma
-        self.weights = nn.Parameter(torch.empty(n_kernel, dim_in, dim_out))
+        self.weights = nn.Parameter(torch.empty(len(points), dim_in, dim_out))
         self.bias = nn.Parameter(torch.empty(dim_out))
-        self.register_buffer("kernel", torch.from_numpy(kernel_points(n_kernel, radius, rng)))
+        self.register_buffer("kernel", torch.from_numpy(points))
         bound = 1.0 / math.sqrt(dim_in * dim_out)
         nn.init.uniform_(self.weights, -bound, bound)
         nn.init.uniform_(self.bias, -bound, bound)

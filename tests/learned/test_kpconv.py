@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from hybridreg.learned.blocks import PointGroupNorm, linear_on_joined, upsample
 from hybridreg.learned.group_norm import group_norm
 from hybridreg.learned.influence import find_links, kernel_influence
-from hybridreg.learned.kernel_points import kernel_points
-from hybridreg.learned.kpconv import kernel_point_convolution
+from hybridreg.learned.kernel_points import cylindrical_kernel_points, kernel_points
+from hybridreg.learned.kpconv import KPConv, kernel_point_convolution
 from hybridreg.learned.max_pool import max_pool
 
 
@@ -143,3 +143,31 @@ def test_kernel_points_are_spread() -> None:
     turned = kernel_points(15, 2.0, np.random.default_rng(3))
     assert not np.allclose(points, turned, atol=0.1)
     assert np.array_equal(turned, kernel_points(15, 2.0, np.random.default_rng(3)))
+
+
+def test_cylindrical_features_do_not_feel_a_turn_about_the_vertical() -> None:
+    rng = np.random.default_rng(5)
+    points = torch.from_numpy(rng.uniform(-3, 3, (60, 3)).astype(np.float32))
+    turned = points @ torch.tensor([[0.6, 0.8, 0.0], [-0.8, 0.6, 0.0], [0.0, 0.0, 1.0]])
+    neighbors = torch.cdist(points, points).topk(12, largest=False).indices
+    features = torch.from_numpy(rng.normal(size=(60, 4)).astype(np.float32))
+
+    def convolved(cloud: torch.Tensor, cylindrical: bool) -> torch.Tensor:
+        torch.manual_seed(0)
+        kernel = cylindrical_kernel_points(15, 2.0) if cylindrical else kernel_points(15, 2.0)
+        conv = KPConv(4, 8, 1.0, kernel)
+        links = find_links(cloud, cloud, neighbors, cylindrical=cylindrical)
+        return conv(features, neighbors, kernel_influence(links, conv.kernel, conv.sigma)).detach()
+
+    assert torch.allclose(convolved(points, True), convolved(turned, True), atol=1e-5)
+    assert not torch.allclose(convolved(points, False), convolved(turned, False), atol=1e-2)
+
+
+def test_cylindrical_kernel_points_cover_the_half_disc() -> None:
+    for count in (8, 15, 24):
+        points = cylindrical_kernel_points(count, 2.0)
+        assert points.shape == (count, 3)
+        assert (points[:, 0] > -1e-6).all()
+        assert (points[:, 1] == 0.0).all()
+        assert len(np.unique(points.round(3), axis=0)) == count
+        assert np.linalg.norm(points, axis=1).max() == pytest.approx(1.8, abs=1e-5)
