@@ -7,10 +7,10 @@ import dataclasses
 import os
 import sys
 from collections.abc import Mapping, Sequence
-from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
+from hybridreg.learned import recipes
 from hybridreg.learned.config import NetworkConfig
 from hybridreg.learned.plain_values import build
 from hybridreg.learned.sizes import named_config
@@ -24,11 +24,6 @@ else:
 _NETWORK_KEYS = {"size": "small", "omp": True, "vgam": True}
 
 
-def known() -> list[str]:
-    """Names of the recipes that come with the library."""
-    return sorted(f.name[:-5] for f in _shipped().iterdir() if f.name.endswith(".toml"))
-
-
 def read(path: str | os.PathLike[str]) -> Recipe:
     """Read a recipe.
 
@@ -40,11 +35,7 @@ def read(path: str | os.PathLike[str]) -> Recipe:
         Not TOML, an unknown key, or a value that cannot be.
     """
     name = os.fspath(path)
-    file = Path(name) if Path(name).is_file() else _shipped().joinpath(f"{name}.toml")
-    if not file.is_file():
-        raise FileNotFoundError(
-            f"{name}: no such file, and no recipe of that name; known are {', '.join(known())}"
-        )
+    file = recipes.find(name)
     try:
         return parse(tomllib.loads(file.read_text(encoding="utf-8")), name=Path(name).stem)
     except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
@@ -54,7 +45,7 @@ def read(path: str | os.PathLike[str]) -> Recipe:
 
 
 def parse(table: Mapping[str, Any], *, name: str) -> Recipe:
-    """The recipe of a TOML file's content: ``size``, ``omp`` and ``vgam`` choose the network, ``[network]`` alters it."""
+    """The recipe of a file's content: ``size``, ``omp``, ``vgam`` choose the network, ``[network]`` alters it."""
     base = {key: table.get(key, default) for key, default in _NETWORK_KEYS.items()}
     network = network_of(base["size"], omp=base["omp"], vgam=base["vgam"], changes=table.get("network", {}))
     rest = {key: value for key, value in table.items() if key not in _NETWORK_KEYS}
@@ -109,7 +100,3 @@ def _merged(base: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, An
             _merged(inner, value) if isinstance(inner, Mapping) and isinstance(value, Mapping) else value
         )
     return merged
-
-
-def _shipped() -> Any:
-    return files("hybridreg.learned").joinpath("recipes")
