@@ -32,10 +32,15 @@ def image_tensor(image: npt.NDArray[np.uint8], height: int, width: int) -> Tenso
         raise ValueError(f"the image has no pixels: {image.shape}")
     colour = image if image.ndim == 3 else np.repeat(image[..., None], 3, axis=2)
     tensor = torch.from_numpy(np.ascontiguousarray(colour)).permute(2, 0, 1).float() / 255.0
-    scale = min(height / tensor.shape[1], width / tensor.shape[2])
-    size = (max(1, round(tensor.shape[1] * scale)), max(1, round(tensor.shape[2] * scale)))
+    size = letterboxed_size(tensor.shape[1], tensor.shape[2], height, width)
     resized = F.interpolate(tensor[None], size=size, mode="bilinear", align_corners=False, antialias=True)[0]
     normalized = (resized - _MEAN) / _STD
     top, left = (height - size[0]) // 2, (width - size[1]) // 2
     # Bars of the mean colour: zero after normalisation.
     return F.pad(normalized, (left, width - size[1] - left, top, height - size[0] - top))
+
+
+def letterboxed_size(rows: int, columns: int, height: int, width: int) -> tuple[int, int]:
+    """Rows and columns of an image of ``rows`` x ``columns`` pixels once it fits into ``height`` x ``width``."""
+    scale = min(height / rows, width / columns)
+    return max(1, round(rows * scale)), max(1, round(columns * scale))

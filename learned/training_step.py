@@ -37,7 +37,7 @@ def training_losses(
     """
     encoding = network.encode(batch)
     overlap = network.predict_overlap(encoding)
-    kept = _kept(network, encoding, overlap, targets, jitter or MaskJitter(), generator)
+    kept = keep_for_training(network, encoding, overlap, targets, jitter or MaskJitter(), generator)
     features = network.attend(encoding, kept)
     config = network.config.loss
     chosen = sample_target_pairs(targets, config.positive_overlap, config.targets, generator)
@@ -56,7 +56,7 @@ def sample_target_pairs(targets: Targets, min_overlap: float, limit: int, rng: t
     return good[order.to(good.device)]
 
 
-def _kept(
+def keep_for_training(
     network: RegistrationNetwork,
     encoding: Encoding,
     overlap: OverlapLogits | None,
@@ -64,6 +64,7 @@ def _kept(
     jitter: MaskJitter,
     generator: torch.Generator,
 ) -> tuple[Kept, Kept]:
+    """Superpoints of both clouds that a step works on: the true mask, disturbed; all of them without OMP."""
     if overlap is None:
         return network.keep(encoding, None)
     limit = network.config.matching.max_superpoints

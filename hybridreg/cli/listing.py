@@ -20,11 +20,12 @@ class Kind(str, Enum):
     datasets = "datasets"
     tables = "tables"
     protocols = "protocols"
+    recipes = "recipes"
 
 
 @plainly
 def command(kind: Annotated[Kind | None, typer.Argument(help="All kinds if not given.")] = None) -> None:
-    """List stages, presets, data sets, tables and protocols."""
+    """List stages, presets, data sets, tables, protocols and training recipes."""
     for each in Kind if kind is None else [kind]:
         print(f"{each.value}:")
         for line in lines(each):
@@ -36,6 +37,7 @@ def lines(kind: Kind) -> Iterator[str]:
     from hybridreg import presets, registry
     from hybridreg.data import catalogue
     from hybridreg.eval import protocols, recipe
+    from hybridreg.learned import recipes
     from hybridreg.slots import SLOTS
 
     if kind is Kind.stages:
@@ -47,5 +49,7 @@ def lines(kind: Kind) -> Iterator[str]:
         yield from (f"{name}:..." for name in catalogue.names())
     elif kind is Kind.tables:
         yield from recipe.known()
+    elif kind is Kind.recipes:
+        yield from recipes.names()
     else:
         yield from (each.describe().removeprefix("protocol ") for each in protocols.PROTOCOLS.values())

@@ -31,6 +31,10 @@ class Dataset(Sequence[LabelledPair], ABC):
         """Changes when the pairs or their truths do."""
         return f"{zlib.crc32(repr(self.ids).encode()):08x}"
 
+    def pair_fingerprint(self, index: int) -> str:
+        """Changes when pair number `index` does: under it, what was computed of the pair may be kept."""
+        return f"{self.fingerprint()}-{self.ids[index]}"
+
     def __len__(self) -> int:
         return len(self.ids)
 
@@ -70,3 +74,12 @@ def fingerprint_of(pairs: Sequence[LabelledPair]) -> str:
     """Fingerprint of any sequence: its own where it has one, else that of the names."""
     own = getattr(pairs, "fingerprint", None)
     return str(own()) if callable(own) else f"{zlib.crc32(repr(ids_of(pairs)).encode()):08x}"
+
+
+def pair_fingerprints_of(pairs: Sequence[LabelledPair]) -> list[str]:
+    """Fingerprint of each pair of any sequence: its own where it has one, else the sequence's and its name."""
+    own = getattr(pairs, "pair_fingerprint", None)
+    if callable(own):
+        return [str(own(index)) for index in range(len(pairs))]
+    whole = fingerprint_of(pairs)
+    return [f"{whole}-{name}" for name in ids_of(pairs)]

@@ -60,12 +60,18 @@ class PairFolder(Dataset):
     def fingerprint(self) -> str:
         digest = 0
         for name in self.ids:
-            files = _files(self.root / name)
-            sizes = {kind: file.stat().st_size for kind, file in files.items()}
-            digest = zlib.crc32(
-                repr((name, sorted(sizes.items()))).encode() + files["meta"].read_bytes(), digest
-            )
+            digest = self._digest(name, digest)
         return f"{digest:08x}"
+
+    def pair_fingerprint(self, index: int) -> str:
+        """Of the pair's own files, so that a folder that grows keeps what was computed of its pairs."""
+        name = self.ids[index]
+        return f"{self._digest(name, 0):08x}-{name}"
+
+    def _digest(self, name: str, before: int) -> int:
+        files = _files(self.root / name)
+        sizes = {kind: file.stat().st_size for kind, file in files.items()}
+        return zlib.crc32(repr((name, sorted(sizes.items()))).encode() + files["meta"].read_bytes(), before)
 
 
 def load_pair(folder: Path) -> LabelledPair:

@@ -52,6 +52,10 @@ class Simulated(Dataset):
         """Changes with the simulator's version too, as the same names then stand for other pairs."""
         return f"sim{VERSION}-{super().fingerprint()}"
 
+    def pair_fingerprint(self, index: int) -> str:
+        """The pair's name and the simulator's version, however many pairs are asked for."""
+        return f"sim{VERSION}-{pair_id(self.split, self.tier, self.seed, index)}"
+
 
 # Yaw starts ask for the same pair several times in a row.
 @lru_cache(maxsize=1)

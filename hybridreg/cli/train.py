@@ -1,0 +1,51 @@
+# SPDX-License-Identifier: MIT
+"""`hybridreg train`: a network from a recipe."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from hybridreg.cli import options
+from hybridreg.cli.faults import plainly
+
+
+@plainly
+def command(
+    recipe: Annotated[str, typer.Argument(help="TOML file, or the name of one: `hybridreg list recipes`.")],
+    data: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Training data instead of the recipe's; NAME=DATA replaces one source. Repeatable."
+        ),
+    ] = None,
+    out: Annotated[Path | None, typer.Option(help="Folder; runs/<recipe's name> if not given.")] = None,
+    resume: Annotated[bool, typer.Option("--resume", help="Go on from the folder's checkpoint.")] = False,
+    devices: Annotated[int, typer.Option(min=1, help="Processes, one a GPU; torchrun sets its own.")] = 1,
+    accelerator: Annotated[str, typer.Option(help="auto, cpu, cuda or mps.")] = "auto",
+    steps_scale: Annotated[float, typer.Option(help="Makes all phases longer or shorter.")] = 1.0,
+    cache: Annotated[Path, typer.Option(help="Folder of prepared pairs, shared by runs.")] = Path(
+        "runs/prepared"
+    ),
+    workers: options.Workers = 1,
+) -> None:
+    """Train a network; stopped or killed, it goes on with --resume. Ends with weights and their card."""
+    from hybridreg.learned.training import recipe_file
+    from hybridreg.learned.training.run import RunOptions, train
+
+    wanted = recipe_file.read(recipe)
+    if data:
+        wanted = recipe_file.with_data(wanted, data)
+    if steps_scale != 1.0:
+        wanted = recipe_file.scaled(wanted, steps_scale)
+    folder = out or Path("runs") / wanted.name
+    run = RunOptions(
+        out=folder, cache=cache, resume=resume, devices=devices, accelerator=accelerator, workers=workers
+    )
+    best = train(wanted, run)
+    if best is None:
+        print(f"stopped; go on with --resume --out {folder}")
+    else:
+        print(f"written to {best}: weights and card")

@@ -1,0 +1,2 @@
+# SPDX-License-Identifier: MIT
+"""Training: recipes, prepared pairs, the loop, checkpoints and validation."""

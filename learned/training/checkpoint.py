@@ -1,0 +1,73 @@
+# SPDX-License-Identifier: MIT
+"""Where a run stands, on disk: written whole, read safely."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+import torch
+
+from hybridreg import __version__
+from hybridreg.io.atomic import atomic_path
+
+_FORMAT = 1
+
+
+@dataclass(kw_only=True)
+class Progress:
+    """Where a run stands. Together with the seed it decides all that follows: every sample has a random generator
+    of its own, made from the seed and its number, so that no generator's state has to be kept."""
+
+    phase: int = 0
+    step: int = 0  # optimiser steps of the phase that are done
+    total: int = 0  # of all phases
+    skipped: dict[str, int] = field(default_factory=dict)  # steps skipped, by pair
+    seconds: float = 0.0  # of training, over all runs
+    best: tuple[float, ...] = ()  # rank of the best validation
+    best_total: int = 0  # and the step it was made at
+    window: dict[str, list[float]] = field(default_factory=dict)  # sums since the log's last line
+
+
+def save(
+    path: Path,
+    progress: Progress,
+    network: torch.nn.Module,
+    optimizer: torch.optim.Optimizer | None,
+    recipe: dict[str, Any],
+) -> None:
+    """Write a checkpoint, whole or not at all."""
+    content = {
+        "format": _FORMAT,
+        "version": __version__,
+        "recipe": recipe,
+        "progress": asdict(progress),
+        "network": network.state_dict(),
+        "optimizer": None if optimizer is None else optimizer.state_dict(),
+    }
+    with atomic_path(path) as temporary:
+        torch.save(content, temporary)
+
+
+def load(path: str | os.PathLike[str]) -> dict[str, Any]:
+    """The content of a checkpoint, its progress as `Progress`.
+
+    Raises
+    ------
+    FileNotFoundError
+        There is none.
+    ValueError
+        The file is damaged or of another format.
+    """
+    if not Path(path).is_file():
+        raise FileNotFoundError(f"{os.fspath(path)}: there is no checkpoint to resume from")
+    try:
+        content: dict[str, Any] = torch.load(path, map_location="cpu", weights_only=True)
+    except Exception as error:  # torch raises half a dozen types for a damaged file
+        raise ValueError(f"{os.fspath(path)} is damaged: {error}") from error
+    if content.get("format") != _FORMAT:
+        raise ValueError(f"{os.fspath(path)}: a checkpoint of format {content.get('format')}, not {_FORMAT}")
+    content["progress"] = Progress(**content["progress"])
+    return content

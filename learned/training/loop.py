@@ -1,0 +1,184 @@
+# SPDX-License-Identifier: MIT
+"""The loop: phase by phase, step by step, with log, validation and checkpoints in between."""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import torch
+from torch import nn
+
+from hybridreg.learned.network import RegistrationNetwork
+from hybridreg.learned.training import checkpoint
+from hybridreg.learned.training.checkpoint import Progress
+from hybridreg.learned.training.gradients import StepOutcome, finish_step
+from hybridreg.learned.training.objective import Outcome, objective
+from hybridreg.learned.training.order import Order
+from hybridreg.learned.training.pair_source import PairSource
+from hybridreg.learned.training.recipe import Phase, Recipe
+from hybridreg.learned.training.record import Record
+from hybridreg.learned.training.samples import PhaseSamples, Sample, Unusable, stream
+from hybridreg.learned.training.schedule import make_optimizer, rate_at, set_rate, steps_of, trainable
+from hybridreg.learned.training.stopping import StopFlag
+from hybridreg.learned.training_mask import MaskJitter
+
+if TYPE_CHECKING:
+    from lightning_fabric import Fabric
+
+_log = logging.getLogger(__name__)
+CHECKPOINT = "checkpoint.pt"
+
+
+class Loop:
+    """A run of a recipe; ``run`` goes on from wherever ``progress`` stands."""
+
+    def __init__(
+        self,
+        fabric: Fabric,
+        recipe: Recipe,
+        network: RegistrationNetwork,
+        sources: Sequence[PairSource],
+        out: Path,
+        record: Record,
+        stop: StopFlag,
+    ) -> None:
+        self.fabric, self.recipe, self.network = fabric, recipe, network
+        self.sources, self.out, self.record, self.stop = sources, out, record, stop
+        self.progress = record.progress
+        self._saved = time.monotonic()
+
+    def run(self, optimizer_state: dict[str, Any] | None = None) -> bool:
+        """Train to the end; false when the run was stopped before it, with a checkpoint written."""
+        while self.progress.phase < len(self.recipe.phase):
+            phase = self.recipe.phase[self.progress.phase]
+            optimizer = make_optimizer(phase, self.network)
+            if optimizer_state is not None:
+                optimizer.load_state_dict(optimizer_state)
+                optimizer_state = None
+            if not self._run_phase(phase, optimizer):
+                return False
+            self.progress.phase, self.progress.step = self.progress.phase + 1, 0
+            self._save(None)
+        return True
+
+    def _run_phase(self, phase: Phase, optimizer: torch.optim.Optimizer) -> bool:
+        batch = self._batch(phase)
+        samples, steps = self._samples(phase, batch)
+        parameters = trainable(optimizer)
+        self.record.begin_phase(phase, steps)
+        upcoming = stream(samples, self._numbers(batch, steps), self.recipe.data.loaders)
+        for step in range(self.progress.step, steps):
+            set_rate(optimizer, rate_at(phase, step, steps))
+            bad = self._gather(phase, upcoming, step * batch, batch)
+            outcome = finish_step(self.fabric, optimizer, parameters, bad, self.recipe.clip, self.stop.asked)
+            self._note(outcome, samples, step * batch)
+            self.record.step(phase, step, rate_at(phase, step, steps), outcome.norm)
+            last = step + 1 == steps
+            if last or (self.recipe.every and (step + 1) % self.recipe.every == 0):
+                self._validate(phase)
+            self._save_when_due(optimizer, outcome.stop)
+            if outcome.stop and not last:
+                return False
+        return True
+
+    def _gather(
+        self, phase: Phase, upcoming: Iterator[Sample | Unusable], first: int, batch: int
+    ) -> torch.Tensor:
+        # Gradients of this process's share of the batch; 1 in the answer where a loss was not finite.
+        bad = torch.zeros(batch, device=self.fabric.device)
+        for place in range(self.fabric.global_rank, batch, self.fabric.world_size):
+            with self.record.data_time():
+                sample = next(upcoming)
+            assert sample.number == first + place
+            if isinstance(sample, Unusable):
+                _log.warning("pair %s cannot be used: %s", sample.id, sample.problem)
+                bad[place] = 1.0
+                continue
+            outcome = self._forward(phase, sample.to(self.fabric.device))
+            if bool(torch.isfinite(outcome.total)):
+                (outcome.total / batch).backward()  # type: ignore[no-untyped-call]
+                self.record.outcome(self.network, outcome, sample)
+            else:
+                bad[place] = 1.0
+        return bad
+
+    def _forward(self, phase: Phase, sample: Sample) -> Outcome:
+        seeds = np.random.SeedSequence([*self._seed(), 3, sample.number]).generate_state(2)
+        torch.manual_seed(int(seeds[0]))  # for what the network itself draws: images left out
+        generator = torch.Generator().manual_seed(int(seeds[1]))
+        with self.fabric.autocast():
+            return objective(
+                self.network,
+                sample,
+                phase.losses,
+                self.recipe.infonce,
+                MaskJitter(use_predicted=phase.use_predicted),
+                generator,
+            )
+
+    def _samples(self, phase: Phase, batch: int) -> tuple[PhaseSamples, int]:
+        weights = [
+            phase.data.get(source.title, 0.0) if phase.data else own.weight
+            for source, own in zip(self.sources, self.recipe.data.train, strict=True)
+        ]
+        sizes = [len(source) for source in self.sources]
+        used = sum(size for size, weight in zip(sizes, weights, strict=True) if weight)
+        steps = steps_of(phase, used, batch)
+        order = Order(sizes, weights, steps * batch, self._seed())
+        return PhaseSamples(self.sources, order, self.recipe.augmentation, self._seed()), steps
+
+    def _batch(self, phase: Phase) -> int:
+        world = self.fabric.world_size
+        batch = max(phase.accumulate, world)
+        if batch % world:
+            raise ValueError(f"phase {phase.name!r}: accumulate={batch} is no multiple of {world} processes")
+        return batch
+
+    def _numbers(self, batch: int, steps: int) -> list[int]:
+        mine = range(self.fabric.global_rank, batch, self.fabric.world_size)
+        return [step * batch + place for step in range(self.progress.step, steps) for place in mine]
+
+    def _seed(self) -> tuple[int, int]:
+        return self.recipe.seed, self.progress.phase
+
+    def _note(self, outcome: StepOutcome, samples: PhaseSamples, first: int) -> None:
+        self.progress.step += 1
+        self.progress.total += 1
+        if outcome.stepped:
+            return
+        names = [samples.id_of(first + place) for place in outcome.bad] or ["gradient"]
+        for name in names:
+            self.progress.skipped[name] = self.progress.skipped.get(name, 0) + 1
+        _log.warning("step %d skipped, not finite: %s", self.progress.step, ", ".join(names))
+
+    def _validate(self, phase: Phase) -> None:
+        if self.fabric.is_global_zero:
+            self.record.validate(self.network, phase, self.fabric.device)
+        self.fabric.barrier()
+
+    def _save_when_due(self, optimizer: torch.optim.Optimizer, stop: bool) -> None:
+        minutes = (time.monotonic() - self._saved) / 60.0
+        if stop or minutes >= self.recipe.checkpoint_minutes:
+            self._save(optimizer)
+
+    def _save(self, optimizer: torch.optim.Optimizer | None) -> None:
+        if self.fabric.is_global_zero:
+            self.record.keep_time()
+            checkpoint.save(
+                self.out / CHECKPOINT, self.progress, self.network, optimizer, self.recipe.to_dict()
+            )
+        self._saved = time.monotonic()
+        self.fabric.barrier()
+
+
+def count_parameters(network: nn.Module) -> int:
+    """Parameters of a network, frozen ones too."""
+    return sum(parameter.numel() for parameter in network.parameters())
+
+
+__all__ = ["CHECKPOINT", "Loop", "Progress", "count_parameters"]

@@ -1,0 +1,116 @@
+# SPDX-License-Identifier: MIT
+"""The losses that a phase weighs, of one sample; what has no weight is not computed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor
+
+from hybridreg.learned.circle_loss import circle_loss
+from hybridreg.learned.fine_loss import assignment_loss
+from hybridreg.learned.infonce_loss import InfoNceConfig, infonce
+from hybridreg.learned.losses import mask_loss, overlap_matrix
+from hybridreg.learned.network import Encoding, RegistrationNetwork
+from hybridreg.learned.superpoint_mask import Kept
+from hybridreg.learned.training.recipe import LossWeights
+from hybridreg.learned.training.samples import Sample
+from hybridreg.learned.training_mask import MaskJitter
+from hybridreg.learned.training_step import keep_for_training, sample_target_pairs
+
+
+@dataclass(frozen=True, kw_only=True)
+class Matched:
+    """What the matcher made of a sample, for the log."""
+
+    encoding: Encoding
+    kept: tuple[Kept, Kept]
+    features: tuple[Tensor, Tensor]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Outcome:
+    """Losses by name before they are weighed, their weighed sum, and what the log wants to know."""
+
+    total: Tensor
+    parts: dict[str, Tensor]
+    hits: Tensor | None = None
+    matched: Matched | None = None
+
+
+def objective(
+    network: RegistrationNetwork,
+    sample: Sample,
+    weights: LossWeights,
+    contrast: InfoNceConfig,
+    jitter: MaskJitter,
+    generator: torch.Generator,
+) -> Outcome:
+    """Losses of a sample, ready for ``backward``. The network must be in training mode."""
+    if not weights.matcher:
+        points, features = _fine_features(network, sample)
+        loss, hits = contrastive_loss(network, sample, points, features, contrast, generator)
+        return Outcome(total=weights.infonce * loss, parts={"infonce": loss}, hits=hits)
+    encoding = network.encode(sample.batch)
+    parts: dict[str, Tensor] = {}
+    hits = None
+    if weights.infonce:
+        points = (encoding.target.points, encoding.source.points)
+        features = (encoding.target.point_features, encoding.source.point_features)
+        parts["infonce"], hits = contrastive_loss(network, sample, points, features, contrast, generator)
+    overlap = network.predict_overlap(encoding)
+    if weights.mask and overlap is not None:
+        parts["mask"] = mask_loss(overlap, sample.targets, network.config.loss)
+    matched = None
+    if weights.coarse:
+        kept = keep_for_training(network, encoding, overlap, sample.targets, jitter, generator)
+        matched = Matched(encoding=encoding, kept=kept, features=network.attend(encoding, kept))
+        truth = overlap_matrix(sample.targets, kept)
+        parts["coarse"] = circle_loss(*matched.features, truth, network.config.loss)
+    if weights.fine:
+        parts["fine"] = fine_loss(network, encoding, sample, generator)
+    total = torch.stack([getattr(weights, name) * loss for name, loss in parts.items()]).sum()
+    return Outcome(total=total, parts=parts, hits=hits, matched=matched)
+
+
+def fine_loss(
+    network: RegistrationNetwork, encoding: Encoding, sample: Sample, generator: torch.Generator
+) -> Tensor:
+    """Fine loss on random true patch pairs (methods 7.4)."""
+    config, targets = network.config.loss, sample.targets
+    chosen = sample_target_pairs(targets, config.positive_overlap, config.targets, generator)
+    target, source = targets.target[chosen], targets.source[chosen]
+    # The noise of the augmentation may have taken the only point of a patch to the next one.
+    owning = encoding.target.patches.occupied[target] & encoding.source.patches.occupied[source]
+    pairs = network.pair_up(encoding, target[owning], source[owning])
+    assignment = network.assign(encoding, pairs, "log", config.training_sinkhorn_iterations)
+    points = (encoding.target.points, encoding.source.points)
+    return assignment_loss(assignment, pairs, *points, targets.transform, config.positive_radius)
+
+
+def contrastive_loss(
+    network: RegistrationNetwork,
+    sample: Sample,
+    points: tuple[Tensor, Tensor],
+    features: tuple[Tensor, Tensor],
+    contrast: InfoNceConfig,
+    generator: torch.Generator,
+) -> tuple[Tensor, Tensor]:
+    """InfoNCE from source to target and, if wanted, back; and the share of anchors that find their partner."""
+    voxel = network.config.backbone.voxel
+    forth = infonce(features[1], features[0], points[0], sample.partners[1], contrast, voxel, generator)
+    if not contrast.symmetric:
+        return forth.loss, forth.hits
+    back = infonce(features[0], features[1], points[1], sample.partners[0], contrast, voxel, generator)
+    return (forth.loss + back.loss) / 2, (forth.hits + back.hits) / 2
+
+
+def _fine_features(
+    network: RegistrationNetwork, sample: Sample
+) -> tuple[tuple[Tensor, Tensor], tuple[Tensor, Tensor]]:
+    pyramid = sample.batch.pyramid
+    stage = network.config.backbone.fine_stage - 1
+    _, fine = network.backbone(sample.batch.features, pyramid)
+    target, source = fine.split(list(pyramid.lengths[stage]))
+    return pyramid.clouds(stage), (target, source)

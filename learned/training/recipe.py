@@ -1,0 +1,157 @@
+# SPDX-License-Identifier: MIT
+"""What a training run does, from data to schedule: frozen dataclasses that a TOML file fills."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+from hybridreg.learned.config import NetworkConfig
+from hybridreg.learned.infonce_loss import InfoNceConfig
+from hybridreg.learned.training.augmentation import Augmentation
+
+
+@dataclass(frozen=True, kw_only=True)
+class Source:
+    """One data set to learn from or to validate on.
+
+    Attributes
+    ----------
+    data : as ``hybridreg.data.open_dataset`` takes it
+    name : by which phases and tables refer to it; the data's own text if empty
+    weight : share of the samples that come from here, relative to the other sources
+    pairs : only the first so many pairs; 0 for all
+    prepared : prepare all pairs once and keep them on disk; false draws and prepares them as they are needed
+    """
+
+    data: str
+    name: str = ""
+    weight: float = 1.0
+    pairs: int = 0
+    prepared: bool = True
+
+    @property
+    def title(self) -> str:
+        """How the source is called."""
+        return self.name or self.data
+
+
+@dataclass(frozen=True, kw_only=True)
+class DataPlan:
+    """Where the pairs come from. ``loaders`` processes prepare samples ahead of the loop; 0 does it in the loop."""
+
+    train: tuple[Source, ...]
+    val: tuple[Source, ...] = ()
+    loaders: int = 0
+
+    def __post_init__(self) -> None:
+        for kind, sources in (("train", self.train), ("val", self.val)):
+            titles = [source.title for source in sources]
+            if len(set(titles)) < len(titles):
+                raise ValueError(f"data.{kind}: two sources of one name in {titles}; give each its own")
+        if not self.train:
+            raise ValueError("data.train is empty: give at least one source")
+
+
+@dataclass(frozen=True, kw_only=True)
+class LossWeights:
+    """Weights of the losses; one of weight 0 is not computed."""
+
+    infonce: float = 0.0
+    coarse: float = 1.0
+    fine: float = 1.0
+    mask: float = 1.0
+
+    @property
+    def matcher(self) -> bool:
+        """Is any part beyond the backbone trained?"""
+        return bool(self.coarse or self.fine or self.mask)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Phase:
+    """One stretch of training with an optimiser of its own.
+
+    Attributes
+    ----------
+    steps, epochs : length; exactly one of the two. An epoch shows as many samples as there are training pairs
+    rate : learning rate at its highest
+    warmup : steps over which the rate rises linearly from 0
+    decay : "linear" to 0 at the end; "step" by ``decay_factor`` every ``decay_every`` steps (or epochs)
+    backbone_rate : factor on the rate of the backbone; 0 freezes it
+    data : weights of sources by name, instead of their own; sources left out are not used
+    accumulate : pairs of one optimiser step, over all processes together
+    use_predicted : how often a step sees the predicted overlap mask (methods 5.4)
+    """
+
+    name: str
+    steps: int = 0
+    epochs: float = 0.0
+    rate: float = 1e-4
+    warmup: int = 0
+    decay: Literal["linear", "step", "none"] = "none"
+    decay_every: float = 0.0
+    decay_factor: float = 0.95
+    optimizer: Literal["adamw", "adam"] = "adamw"
+    weight_decay: float = 1e-6
+    losses: LossWeights = field(default_factory=LossWeights)
+    backbone_rate: float = 1.0
+    data: Mapping[str, float] = field(default_factory=dict)
+    accumulate: int = 1
+    use_predicted: float = 0.0
+
+    def __post_init__(self) -> None:
+        if (self.steps > 0) == (self.epochs > 0):
+            raise ValueError(f"phase {self.name!r}: give steps or epochs, above 0, and not both")
+        if self.decay == "step" and not self.decay_every > 0:
+            raise ValueError(f"phase {self.name!r}: decay='step' needs decay_every above 0")
+        if self.accumulate < 1:
+            raise ValueError(f"phase {self.name!r}: accumulate={self.accumulate} must be at least 1")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Recipe:
+    """A whole training run.
+
+    Attributes
+    ----------
+    network : the network's complete configuration
+    start : folder or name of trained weights; tensors of the same names are taken over
+    every : steps between validations
+    log_every : steps between lines of the log
+    clip : longest gradient; longer ones are shortened to it
+    """
+
+    name: str
+    network: NetworkConfig
+    data: DataPlan
+    phase: tuple[Phase, ...]
+    seed: int = 0
+    start: str = ""
+    augmentation: Augmentation = field(default_factory=Augmentation)
+    infonce: InfoNceConfig = field(default_factory=InfoNceConfig)
+    every: int = 500
+    log_every: int = 20
+    checkpoint_minutes: float = 5.0
+    clip: float = 1.0
+    precision: Literal["32-true", "bf16-mixed"] = "32-true"
+
+    def __post_init__(self) -> None:
+        if not self.phase:
+            raise ValueError("a recipe needs at least one [[phase]]")
+        known = {source.title for source in self.data.train}
+        for phase in self.phase:
+            unknown = sorted(set(phase.data) - known)
+            if unknown:
+                raise ValueError(
+                    f"phase {phase.name!r}: data names {unknown}; the training sources are {sorted(known)}"
+                )
+            if phase.losses.mask and self.network.omp is None and phase.losses.mask != 1.0:
+                raise ValueError(f"phase {phase.name!r}: a mask loss is weighed, but the network has no OMP")
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values, for checkpoints and cards."""
+        import dataclasses
+
+        return dataclasses.asdict(self)

@@ -1,0 +1,102 @@
+# SPDX-License-Identifier: MIT
+"""Recipes as TOML files, by path or by the name of one that comes with the library."""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+import sys
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from hybridreg.learned import recipes
+from hybridreg.learned.config import NetworkConfig
+from hybridreg.learned.plain_values import build
+from hybridreg.learned.sizes import named_config
+from hybridreg.learned.training.recipe import Phase, Recipe, Source
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
+
+_NETWORK_KEYS = {"size": "small", "omp": True, "vgam": True}
+
+
+def read(path: str | os.PathLike[str]) -> Recipe:
+    """Read a recipe.
+
+    Raises
+    ------
+    FileNotFoundError
+        Neither a file nor a shipped name.
+    ValueError
+        Not TOML, an unknown key, or a value that cannot be.
+    """
+    name = os.fspath(path)
+    file = recipes.find(name)
+    try:
+        return parse(tomllib.loads(file.read_text(encoding="utf-8")), name=Path(name).stem)
+    except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        raise ValueError(f"{name}: not a TOML file ({error})") from error
+    except (ValueError, KeyError) as error:
+        raise ValueError(f"{name}: {error.args[0]}") from error
+
+
+def parse(table: Mapping[str, Any], *, name: str) -> Recipe:
+    """The recipe of a file's content: ``size``, ``omp``, ``vgam`` choose the network, ``[network]`` alters it."""
+    base = {key: table.get(key, default) for key, default in _NETWORK_KEYS.items()}
+    network = network_of(base["size"], omp=base["omp"], vgam=base["vgam"], changes=table.get("network", {}))
+    rest = {key: value for key, value in table.items() if key not in _NETWORK_KEYS}
+    return build(Recipe, {"name": name, **rest, "network": network.to_dict()}, "recipe")
+
+
+def network_of(size: str, *, omp: bool, vgam: bool, changes: Mapping[str, Any]) -> NetworkConfig:
+    """A named configuration with some of its values changed."""
+    merged = _merged(named_config(size, omp=omp, vgam=vgam).to_dict(), changes)
+    return NetworkConfig.from_dict(merged)
+
+
+def with_data(recipe: Recipe, texts: Sequence[str]) -> Recipe:
+    """The recipe on other training data: ``NAME=TEXT`` puts TEXT in a source's place, bare texts replace them all."""
+    named = {source.title: source for source in recipe.data.train}
+    replaced = [text.partition("=") for text in texts]
+    if all(equals and name in named for name, equals, _ in replaced):
+        for name, _, text in replaced:
+            named[name] = dataclasses.replace(named[name], data=text, name=name)
+        return _on(recipe, tuple(named.values()), recipe.phase)
+    phases = tuple(dataclasses.replace(phase, data={}) for phase in recipe.phase)
+    return _on(recipe, tuple(Source(data=text) for text in texts), phases)
+
+
+def scaled(recipe: Recipe, factor: float) -> Recipe:
+    """The recipe with all phases longer or shorter by a factor."""
+    if not factor > 0:
+        raise ValueError(f"steps-scale {factor}: must be above 0")
+    return dataclasses.replace(recipe, phase=tuple(_scaled(phase, factor) for phase in recipe.phase))
+
+
+def _scaled(phase: Phase, factor: float) -> Phase:
+    return dataclasses.replace(
+        phase,
+        steps=max(1, round(phase.steps * factor)) if phase.steps else 0,
+        epochs=phase.epochs * factor,
+        warmup=round(phase.warmup * factor),
+        decay_every=phase.decay_every * factor,
+    )
+
+
+def _on(recipe: Recipe, train: tuple[Source, ...], phases: tuple[Phase, ...]) -> Recipe:
+    data = dataclasses.replace(recipe.data, train=train)
+    return dataclasses.replace(recipe, data=data, phase=phases)
+
+
+def _merged(base: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
+    merged = dict(base)
+    for key, value in changes.items():
+        inner = merged.get(key)
+        merged[key] = (
+            _merged(inner, value) if isinstance(inner, Mapping) and isinstance(value, Mapping) else value
+        )
+    return merged

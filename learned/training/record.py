@@ -1,0 +1,140 @@
+# SPDX-License-Identifier: MIT
+"""What a run leaves behind while it goes: learning curves, validations, the best weights."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import asdict
+from pathlib import Path
+
+import torch
+
+from hybridreg.learned.network import RegistrationNetwork
+from hybridreg.learned.procrustes import apply_transform
+from hybridreg.learned.training.checkpoint import Progress
+from hybridreg.learned.training.log import CurveFile
+from hybridreg.learned.training.objective import Outcome
+from hybridreg.learned.training.pair_source import PairSource
+from hybridreg.learned.training.recipe import Phase
+from hybridreg.learned.training.reporting import Reporter
+from hybridreg.learned.training.samples import Sample
+from hybridreg.learned.training.validation import PROTOCOL, Validation, pair_inlier_ratio, rank, validate
+from hybridreg.learned.weights import save_pretrained
+
+_MEANS = ("loss", "infonce", "coarse", "fine", "mask", "hits", "pir", "ir", "norm")
+_COLUMNS = ("phase", "step", "rate", *_MEANS, "skipped", "steps_per_s", "data_share")
+_VALIDATION = tuple(Validation.__dataclass_fields__)
+
+
+class Record:
+    """Sums between two lines of the log, and the files of the run. Only the first process writes."""
+
+    def __init__(
+        self,
+        out: Path,
+        progress: Progress,
+        val: Sequence[PairSource],
+        reporter: Reporter,
+        *,
+        writes: bool,
+        log_every: int,
+    ) -> None:
+        self.out, self.progress, self.val = out, progress, val
+        self.reporter, self.writes, self.log_every = reporter, writes, log_every
+        self.curve = CurveFile(out / "log.csv", _COLUMNS)
+        self.validations = CurveFile(out / "validation.csv", ("phase", *_VALIDATION))
+        if writes:
+            self.curve.begin(progress.total)
+            self.validations.begin(progress.total)
+        self._clock = self._line_clock = time.monotonic()
+        self._data_seconds, self._line_steps = 0.0, 0
+
+    def begin_phase(self, phase: Phase, steps: int) -> None:
+        """A phase begins, or goes on."""
+        self.reporter.begin(phase.name, steps, self.progress.step)
+        self._line_clock, self._line_steps, self._data_seconds = time.monotonic(), 0, 0.0
+
+    @contextmanager
+    def data_time(self) -> Iterator[None]:
+        """Count the block's seconds as waiting for data."""
+        start = time.monotonic()
+        yield
+        self._data_seconds += time.monotonic() - start
+
+    def outcome(self, network: RegistrationNetwork, outcome: Outcome, sample: Sample) -> None:
+        """Add a sample's losses; where a line of the log is due, its matches are looked at too."""
+        self._add("loss", float(outcome.total.detach()))
+        for name, loss in outcome.parts.items():
+            self._add(name, float(loss.detach()))
+        if outcome.hits is not None:
+            self._add("hits", float(outcome.hits))
+        if outcome.matched is not None and (self.progress.step + 1) % self.log_every == 0:
+            for name, value in _ratios(network, outcome, sample).items():
+                self._add(name, value)
+
+    def step(self, phase: Phase, step: int, rate: float, norm: float) -> None:
+        """A step is done; write a line when it is time."""
+        self._add("norm", norm)
+        self._line_steps += 1
+        self.reporter.advance()
+        if (step + 1) % self.log_every:
+            return
+        seconds = max(time.monotonic() - self._line_clock, 1e-9)
+        row = {
+            "total": self.progress.total,
+            "phase": phase.name,
+            "step": step + 1,
+            "rate": rate,
+            **{name: total / count for name, (total, count) in self.progress.window.items()},
+            "skipped": sum(self.progress.skipped.values()),
+            "steps_per_s": self._line_steps / seconds,
+            "data_share": self._data_seconds / seconds,
+        }
+        if self.writes:
+            self.curve.append(row)
+            self.reporter.line(row)
+        self.progress.window.clear()
+        self._line_clock, self._line_steps, self._data_seconds = time.monotonic(), 0, 0.0
+
+    def validate(self, network: RegistrationNetwork, phase: Phase, device: torch.device) -> None:
+        """Measure the network, keep it as ``last/``, and as ``best/`` where it is."""
+        start = time.monotonic()
+        matcher = phase.losses.matcher
+        found = [validate(network, source, matcher=matcher, device=device) for source in self.val]
+        for each in found:
+            self.validations.append({"total": self.progress.total, "phase": phase.name, **asdict(each)})
+        self.reporter.validation(found, self.progress.total)
+        save_pretrained(network, self.out / "last")
+        now = rank(found, matcher) if found else (float(matcher), float(self.progress.total))
+        if not self.progress.best or now > tuple(self.progress.best):
+            self.progress.best, self.progress.best_total = now, self.progress.total
+            save_pretrained(network, self.out / "best")
+        # Validation is no training: the next line's speed must not include it.
+        self._line_clock += time.monotonic() - start
+
+    def keep_time(self) -> None:
+        """Bring the run's clock up to date."""
+        now = time.monotonic()
+        self.progress.seconds += now - self._clock
+        self._clock = now
+
+    def _add(self, name: str, value: float) -> None:
+        if value == value:
+            total, count = self.progress.window.get(name, [0.0, 0.0])
+            self.progress.window[name] = [total + value, count + 1.0]
+
+
+@torch.no_grad()
+def _ratios(network: RegistrationNetwork, outcome: Outcome, sample: Sample) -> dict[str, float]:
+    matched = outcome.matched
+    assert matched is not None
+    superpoints = network.match_superpoints(matched.encoding, matched.kept, matched.features)
+    matches = network.match_points(matched.encoding, superpoints)
+    T = sample.targets.transform.to(matches.source.device)
+    right = (apply_transform(matches.source, T) - matches.target).norm(dim=1) < PROTOCOL.inlier_m
+    return {
+        "pir": pair_inlier_ratio(superpoints, sample.to(T.device).targets),
+        "ir": float(right.float().mean()) if len(right) else 0.0,
+    }

@@ -1,0 +1,99 @@
+# SPDX-License-Identifier: MIT
+"""What a person sees of a run: a progress bar on a terminal, else a line now and then; TensorBoard where installed."""
+
+from __future__ import annotations
+
+import logging
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+from rich.logging import RichHandler
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+from hybridreg.learned.training.validation import Validation
+
+Row = Mapping[str, Any]
+_SHOWN = ("loss", "infonce", "coarse", "fine", "mask", "hits", "pir", "ir", "rate", "steps_per_s")
+
+
+class Reporter:
+    """Progress on stderr. ``quiet`` is for all processes but the first."""
+
+    def __init__(self, folder: Path, *, quiet: bool = False) -> None:
+        self.console = Console(stderr=True, quiet=quiet)
+        self.terminal = self.console.is_terminal and not quiet
+        columns = (
+            TextColumn("{task.description}"),
+            BarColumn(),
+            MofNCompleteColumn(),
+            TimeRemainingColumn(),
+            TextColumn("{task.fields[figures]}"),
+        )
+        self.bar = Progress(*columns, console=self.console, disable=not self.terminal)
+        self.board = None if quiet else _board(folder)
+        self._task = self.bar.add_task("", total=None, figures="", visible=False)
+
+    def __enter__(self) -> Reporter:
+        handler = RichHandler(console=self.console, show_path=False)
+        logging.getLogger("hybridreg.learned.training").addHandler(handler)
+        logging.getLogger("hybridreg.learned.training").setLevel(logging.INFO)
+        self._handler = handler
+        self.bar.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.bar.stop()
+        logging.getLogger("hybridreg.learned.training").removeHandler(self._handler)
+        if self.board is not None:
+            self.board.close()
+
+    def begin(self, title: str, total: int, done: int = 0) -> None:
+        """A new stretch of work."""
+        self.bar.reset(self._task, description=title, total=total, completed=done, figures="", visible=True)
+        if not self.terminal:
+            self.console.print(f"{title}: {done} of {total}", highlight=False)
+
+    def advance(self) -> None:
+        """One step of it is done."""
+        self.bar.advance(self._task)
+
+    def line(self, row: Row) -> None:
+        """A line of the log."""
+        figures = " ".join(f"{name} {row[name]:.4g}" for name in _SHOWN if _told(row.get(name)))
+        self.bar.update(self._task, figures=figures)
+        if not self.terminal:
+            self.console.print(f"{row['phase']} {row['step']}: {figures}", highlight=False, soft_wrap=True)
+        self._to_board("train", row)
+
+    def validation(self, found: Sequence[Validation], total: int) -> None:
+        """The figures of a validation."""
+        for each in found:
+            self.console.print(
+                f"validation at {total}, {each.title}: recall {each.recall:.3f}, inlier ratio {each.inlier_ratio:.3f}, "
+                f"PIR {each.pir:.3f}, {each.rre_deg:.2f} deg, {each.rte_m:.2f} m, mask F1 {each.mask_f1:.3f}",
+                highlight=False,
+                soft_wrap=True,
+            )
+            self._to_board(f"val/{each.title}", {"total": total, **vars(each)})
+
+    def _to_board(self, group: str, row: Row) -> None:
+        if self.board is None:
+            return
+        for name, value in row.items():
+            if isinstance(value, float) and _told(value):
+                self.board.add_scalar(f"{group}/{name}", value, row["total"])
+
+
+def _told(value: Any) -> bool:
+    return isinstance(value, (int, float)) and not math.isnan(value)
+
+
+def _board(folder: Path) -> Any:
+    try:
+        from torch.utils.tensorboard import SummaryWriter
+    except ImportError:
+        return None
+    return SummaryWriter(folder / "tensorboard")

@@ -1,0 +1,118 @@
+# SPDX-License-Identifier: MIT
+"""A whole run: processes, data, network, loop, card."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import torch
+
+from hybridreg.learned.training import checkpoint
+from hybridreg.learned.training.card import make_card, write_card
+from hybridreg.learned.training.checkpoint import Progress
+from hybridreg.learned.training.loop import CHECKPOINT, Loop, count_parameters
+from hybridreg.learned.training.pair_source import PairSource, open_source
+from hybridreg.learned.training.preparing import prepare_all
+from hybridreg.learned.training.processes import start_processes
+from hybridreg.learned.training.recipe import Recipe, Source
+from hybridreg.learned.training.record import Record
+from hybridreg.learned.training.reporting import Reporter
+from hybridreg.learned.training.resuming import check_same
+from hybridreg.learned.training.start import first_network
+from hybridreg.learned.training.stopping import stop_on_signals
+
+if TYPE_CHECKING:
+    from lightning_fabric import Fabric
+
+
+@dataclass(frozen=True, kw_only=True)
+class RunOptions:
+    """What a run needs to know beside its recipe.
+
+    Attributes
+    ----------
+    out : folder of the run
+    cache : folder of prepared pairs, shared by runs
+    resume : go on from the checkpoint in ``out``
+    devices, accelerator : as Lightning Fabric takes them; ``torchrun`` overrides the number
+    workers : processes that prepare pairs
+    """
+
+    out: Path
+    cache: Path
+    resume: bool = False
+    devices: int = 1
+    accelerator: str = "auto"
+    workers: int = 1
+
+
+def train(recipe: Recipe, options: RunOptions) -> Path | None:
+    """Train a network; the folder of the best weights, or None where the run was stopped before its end.
+
+    Raises
+    ------
+    FileExistsError
+        ``out`` holds a run already, and it was not asked to go on.
+    ValueError, FileNotFoundError
+        Data that cannot be opened, or a checkpoint of another recipe.
+    """
+    before = _before(recipe, options)
+    fabric = start_processes(options.devices, options.accelerator, recipe.precision)
+    options.out.mkdir(parents=True, exist_ok=True)
+    quiet = not fabric.is_global_zero
+    with (
+        Reporter(options.out, quiet=quiet) as reporter,
+        stop_on_signals() as stop,
+        torch.random.fork_rng(devices=[]),
+    ):
+        training = _sources(recipe, recipe.data.train, options, fabric, reporter)
+        val = _sources(recipe, recipe.data.val, options, fabric, reporter)
+        network = first_network(recipe)
+        if before:
+            network.load_state_dict(before["network"])
+        fabric.to_device(network)
+        progress = before["progress"] if before else Progress()
+        record = Record(options.out, progress, val, reporter, writes=not quiet, log_every=recipe.log_every)
+        loop = Loop(fabric, recipe, network, training, options.out, record, stop)
+        if not loop.run(before.get("optimizer")):
+            return None
+        if fabric.is_global_zero:
+            figures = (record.validations, count_parameters(network), _device_name(fabric))
+            write_card(options.out / "best", make_card(recipe, progress, training, val, *figures))
+    return options.out / "best"
+
+
+def _before(recipe: Recipe, options: RunOptions) -> dict[str, Any]:
+    path = options.out / CHECKPOINT
+    if options.resume:
+        content = checkpoint.load(path)
+        check_same(recipe.to_dict(), content["recipe"], content["progress"].phase)
+        return content
+    if path.exists():
+        raise FileExistsError(
+            f"{options.out} holds a run already: go on with --resume, or name another folder"
+        )
+    return {}
+
+
+def _sources(
+    recipe: Recipe, wanted: Sequence[Source], options: RunOptions, fabric: Fabric, reporter: Reporter
+) -> list[PairSource]:
+    opened = []
+    for source in wanted:
+        found = open_source(source, recipe, options.cache)
+        if fabric.is_global_zero:
+            reporter.begin(f"preparing {found.title}", len(found))
+            found = prepare_all(found, options.workers, reporter.advance)
+        usable = fabric.broadcast(found.usable)
+        opened.append(found.only(usable))
+    return opened
+
+
+def _device_name(fabric: Fabric) -> str:
+    device = fabric.device
+    name = torch.cuda.get_device_name(device) if device.type == "cuda" else "CPU"
+    return f"{fabric.world_size} x {name}"

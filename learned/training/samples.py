@@ -1,0 +1,134 @@
+# SPDX-License-Identifier: MIT
+"""Samples of a phase: augmented pairs by number, read ahead by worker processes where wanted."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import torch
+from torch import Tensor
+from torch.utils.data import DataLoader, Dataset
+
+from hybridreg.learned.batch import Batch
+from hybridreg.learned.config import ImageConfig
+from hybridreg.learned.image_input import image_tensor
+from hybridreg.learned.targets import Targets
+from hybridreg.learned.training.augmentation import (
+    Augmentation,
+    draw_motions,
+    move_pyramid,
+    move_truth,
+    relight,
+)
+from hybridreg.learned.training.order import Order
+from hybridreg.learned.training.pair_source import PairSource
+from hybridreg.learned.training.prepared import PreparedPair
+
+
+@dataclass(frozen=True, kw_only=True)
+class Sample:
+    """What a step works on."""
+
+    number: int
+    id: str
+    batch: Batch
+    targets: Targets
+    partners: tuple[Tensor, Tensor]
+
+    def to(self, device: torch.device | str) -> Sample:
+        """The same sample on another device."""
+        fields = {name: value.to(device) for name, value in vars(self.targets).items()}
+        return replace(
+            self,
+            batch=self.batch.to(device),
+            targets=Targets(**fields),
+            partners=(self.partners[0].to(device), self.partners[1].to(device)),
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Unusable:
+    """A pair that could not be made into a sample."""
+
+    number: int
+    id: str
+    problem: str
+
+
+class PhaseSamples(Dataset):  # type: ignore[type-arg]
+    """All samples of a phase by number; each has a random generator of its own, so that order does not matter."""
+
+    def __init__(
+        self, sources: Sequence[PairSource], order: Order, augmentation: Augmentation, seed: Sequence[int]
+    ) -> None:
+        self.sources, self.order = tuple(sources), order
+        self.augmentation, self.seed = augmentation, tuple(seed)
+
+    def __len__(self) -> int:
+        return len(self.order)
+
+    def __getitem__(self, number: int) -> Sample | Unusable:
+        source, pair = self.order[number]
+        rng = np.random.default_rng([*self.seed, 2, number])
+        try:
+            scale = float(rng.uniform(*self.augmentation.scale)) if self.augmentation.rescales else 1.0
+            prepared = self.sources[source].load(pair, scale)
+        except Exception as error:  # a bad pair is a skipped step, named in the log
+            name = self.id_of(number)
+            return Unusable(
+                number=number, id=name, problem=" ".join(f"{type(error).__name__}: {error}".split())
+            )
+        return augment(prepared, number, self.augmentation, self.sources[source].config.image, rng)
+
+    def id_of(self, number: int) -> str:
+        """Name of the pair that a sample shows."""
+        source, pair = self.order[number]
+        return self.sources[source].ids[self.sources[source].usable[pair]]
+
+
+def augment(
+    pair: PreparedPair, number: int, how: Augmentation, image: ImageConfig | None, rng: np.random.Generator
+) -> Sample:
+    """A disturbed copy of a pair."""
+    motions = draw_motions(how, rng)
+    pyramid = move_pyramid(pair.pyramid, motions, how.jitter, rng)
+    tensor = None
+    if image is not None and pair.image is not None:
+        tensor = image_tensor(relight(pair.image, how.light, rng), image.height, image.width)
+    return Sample(
+        number=number,
+        id=pair.id,
+        batch=Batch(pyramid=pyramid, features=pair.features, image=tensor),
+        targets=replace(pair.targets, transform=move_truth(pair.targets.transform, motions)),
+        partners=pair.partners,
+    )
+
+
+def undisturbed(pair: PreparedPair, image: ImageConfig | None) -> Sample:
+    """A pair as it is, for validation."""
+    still = Augmentation(rotation="none", shift=0.0, jitter=0.0, light=0.0)
+    return augment(pair, 0, still, image, np.random.default_rng(0))
+
+
+def stream(samples: PhaseSamples, numbers: Iterable[int], loaders: int) -> Iterator[Sample | Unusable]:
+    """The samples of those numbers, in order."""
+    loader = DataLoader(
+        samples,
+        batch_size=None,
+        sampler=list(numbers),
+        num_workers=loaders,
+        collate_fn=_as_it_is,
+        prefetch_factor=4 if loaders else None,
+        worker_init_fn=_one_thread,
+    )
+    return iter(loader)
+
+
+def _as_it_is(sample: Sample | Unusable) -> Sample | Unusable:
+    return sample
+
+
+def _one_thread(_: int) -> None:
+    torch.set_num_threads(1)

@@ -1,0 +1,54 @@
+# SPDX-License-Identifier: MIT
+"""Optimiser and learning rate of a phase. The rate is a function of the step, so resuming needs no state of it."""
+
+from __future__ import annotations
+
+import math
+
+import torch
+from torch import nn
+
+from hybridreg.learned.network import RegistrationNetwork
+from hybridreg.learned.training.recipe import Phase
+
+
+def steps_of(phase: Phase, pairs: int, batch: int) -> int:
+    """Optimiser steps of a phase over ``pairs`` training pairs, ``batch`` of them a step."""
+    return phase.steps or max(1, math.ceil(phase.epochs * pairs / batch))
+
+
+def rate_at(phase: Phase, step: int, steps: int) -> float:
+    """Learning rate of step ``step`` (from 0) of ``steps``."""
+    if step < phase.warmup:
+        return phase.rate * (step + 1) / phase.warmup
+    if phase.decay == "linear":
+        return phase.rate * (steps - step) / max(1, steps - phase.warmup)
+    if phase.decay == "step":
+        every = phase.decay_every if phase.steps else phase.decay_every * steps / phase.epochs
+        return phase.rate * phase.decay_factor ** (step // max(1.0, every))
+    return phase.rate
+
+
+def make_optimizer(phase: Phase, network: RegistrationNetwork) -> torch.optim.Optimizer:
+    """The phase's optimiser: the backbone's parameters with a factor on their rate, or frozen at factor 0."""
+    backbone = list(network.backbone.parameters())
+    known = {id(parameter) for parameter in backbone}
+    others = [parameter for parameter in network.parameters() if id(parameter) not in known]
+    for parameter in backbone:
+        parameter.requires_grad_(phase.backbone_rate > 0)
+    groups = [{"params": others, "factor": 1.0}]
+    if phase.backbone_rate > 0:
+        groups.append({"params": backbone, "factor": phase.backbone_rate})
+    make = torch.optim.AdamW if phase.optimizer == "adamw" else torch.optim.Adam
+    return make(groups, lr=phase.rate, weight_decay=phase.weight_decay)
+
+
+def set_rate(optimizer: torch.optim.Optimizer, rate: float) -> None:
+    """Set the rate of every group, times its factor."""
+    for group in optimizer.param_groups:
+        group["lr"] = rate * group["factor"]
+
+
+def trainable(optimizer: torch.optim.Optimizer) -> list[nn.Parameter]:
+    """All parameters that an optimiser moves."""
+    return [parameter for group in optimizer.param_groups for parameter in group["params"]]

@@ -1,0 +1,46 @@
+# SPDX-License-Identifier: MIT
+"""The network at the start of a run: random, or with what other weights already know."""
+
+from __future__ import annotations
+
+import logging
+
+import torch
+
+from hybridreg.learned.network import RegistrationNetwork
+from hybridreg.learned.training.recipe import Recipe
+from hybridreg.learned.weights import from_pretrained
+
+_log = logging.getLogger(__name__)
+
+
+def first_network(recipe: Recipe) -> RegistrationNetwork:
+    """A network in training mode, its weights fixed by the recipe's seed.
+
+    Raises
+    ------
+    ValueError
+        `recipe.start` has a tensor of another shape, or no tensor that this network has.
+    """
+    with torch.random.fork_rng(devices=[]):
+        torch.default_generator.manual_seed(recipe.seed)
+        network = RegistrationNetwork(recipe.network, recipe.seed)
+    if recipe.start:
+        _take_over(network, recipe.start)
+    return network.train()
+
+
+def _take_over(network: RegistrationNetwork, start: str) -> None:
+    own, found = network.state_dict(), from_pretrained(start).state_dict()
+    shared = {name: tensor for name, tensor in found.items() if name in own}
+    wrong = [name for name, tensor in shared.items() if tensor.shape != own[name].shape]
+    if wrong or not shared:
+        reason = (
+            f"tensor {wrong[0]} has another shape" if wrong else "no tensor bears a name of this network's"
+        )
+        raise ValueError(f"start={start!r}: {reason}")
+    network.load_state_dict(shared, strict=False)
+    fresh = sorted({name.partition(".")[0] for name in own if name not in shared})
+    _log.info(
+        "start=%s: %d tensors taken over; fresh parts: %s", start, len(shared), ", ".join(fresh) or "none"
+    )

@@ -1,0 +1,54 @@
+# SPDX-License-Identifier: MIT
+"""Tensors computed once and kept on disk, one file for each key."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from safetensors import SafetensorError
+from safetensors.torch import load_file, save_file
+from torch import Tensor
+
+from hybridreg.io.atomic import atomic_path
+
+Tensors = Mapping[str, Tensor]
+
+
+@dataclass(frozen=True)
+class TensorCache:
+    """A folder of safetensors files. The system's page cache is what keeps them in memory.
+
+    ``folder=None`` keeps nothing and computes each time.
+    """
+
+    folder: Path | None
+
+    def path(self, key: object) -> Path:
+        """Where the tensors of a key lie."""
+        if self.folder is None:
+            raise ValueError("this cache has no folder")
+        name = hashlib.sha256(repr(key).encode()).hexdigest()[:32]
+        return self.folder / name[:2] / f"{name[2:]}.safetensors"
+
+    def has(self, key: object) -> bool:
+        """Are they there?"""
+        return self.folder is not None and self.path(key).is_file()
+
+    def get(self, key: object, make: Callable[[], Tensors]) -> Tensors:
+        """The tensors of a key, read or else made; a damaged file is made anew."""
+        if self.folder is None:
+            return make()
+        path = self.path(key)
+        if path.is_file():
+            try:
+                return load_file(path)
+            except SafetensorError:
+                path.unlink(missing_ok=True)
+        tensors = make()
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with atomic_path(path) as temporary:
+            save_file({name: tensor.contiguous() for name, tensor in tensors.items()}, temporary)
+        return tensors

@@ -1,0 +1,143 @@
+# SPDX-License-Identifier: MIT
+"""Validation by the evaluator's own scoring: LGR without refinement, protocol `cross3dreg`."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from torch import Tensor
+from torch.nn import functional as F
+
+from hybridreg.eval import metrics
+from hybridreg.eval.protocols import protocol
+from hybridreg.eval.row import Row, matrix
+from hybridreg.eval.scoring import score
+from hybridreg.learned.lgr import local_to_global
+from hybridreg.learned.network import RegistrationNetwork
+from hybridreg.learned.superpoint_matching import SuperpointMatches
+from hybridreg.learned.targets import Targets
+from hybridreg.learned.training.pair_source import PairSource
+from hybridreg.learned.training.samples import Sample, undisturbed
+
+PROTOCOL = protocol("cross3dreg")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Validation:
+    """Figures of one validation set; NaN where a phase has nothing to measure.
+
+    Attributes
+    ----------
+    recall, inlier_ratio : of the whole network; in a warm-up by InfoNCE the inlier ratio of mutual nearest
+        neighbours among the fine features, and no recall
+    pir : share of matched superpoints whose patches overlap
+    mask_f1 : of the overlap mask
+    """
+
+    title: str
+    pairs: int
+    recall: float
+    rre_deg: float
+    rte_m: float
+    inlier_ratio: float
+    pir: float
+    mask_f1: float
+
+
+@torch.inference_mode()
+def validate(
+    network: RegistrationNetwork, source: PairSource, *, matcher: bool, device: torch.device
+) -> Validation:
+    """Figures of a network on one source; ``matcher`` false looks at the fine features alone."""
+    network.eval()
+    rows, pirs, masks = [], [], []
+    for number in range(len(source)):
+        sample = undisturbed(source.load(number), source.config.image).to(device)
+        if matcher:
+            row, pir, mask = _matched(network, sample, number)
+            pirs.append(pir)
+            masks += mask
+        else:
+            row = _described(network, sample, number)
+        rows.append(row)
+    network.train()
+    result = score(rows, PROTOCOL)
+    return Validation(
+        title=source.title,
+        pairs=len(rows),
+        recall=result.recall if matcher else float("nan"),
+        rre_deg=result.rre_deg_median if matcher else float("nan"),
+        rte_m=result.rte_m_median if matcher else float("nan"),
+        inlier_ratio=result.inlier_ratio,
+        pir=_mean(pirs),
+        mask_f1=_mean(masks),
+    )
+
+
+def rank(found: Sequence[Validation], matcher: bool) -> tuple[float, ...]:
+    """What makes one validation better than another: recall, then inlier ratio; any matcher beats a warm-up."""
+    recall = _mean([each.recall for each in found]) if matcher else 0.0
+    return (float(matcher), round(recall, 9), _mean([each.inlier_ratio for each in found]))
+
+
+def pair_inlier_ratio(superpoints: SuperpointMatches, targets: Targets) -> float:
+    """PIR: share of superpoint matches whose patches overlap under the true pose (methods 1.3)."""
+    if len(superpoints) == 0:
+        return 0.0
+    columns = len(targets.mask_source)
+    true = targets.target * columns + targets.source
+    return float(torch.isin(superpoints.target * columns + superpoints.source, true).float().mean())
+
+
+def _matched(network: RegistrationNetwork, sample: Sample, number: int) -> tuple[Row, float, list[float]]:
+    output = network(sample.batch)
+    matches, targets = output.matches, sample.targets
+    T = None
+    if len(matches) >= 3:
+        arguments = (matches.target.double(), matches.source.double(), matches.weight.double(), matches.group)
+        T = local_to_global(*arguments, network.config.lgr).transform.cpu().numpy()
+    masks = (
+        [] if output.overlap is None else [_mask_f1(output.overlap.target, output.overlap.source, targets)]
+    )
+    row = _row(sample, number, matches.source, matches.target, T)
+    return row, pair_inlier_ratio(output.superpoints, targets), masks
+
+
+def _described(network: RegistrationNetwork, sample: Sample, number: int) -> Row:
+    pyramid = sample.batch.pyramid
+    stage = network.config.backbone.fine_stage - 1
+    _, fine = network.backbone(sample.batch.features, pyramid)
+    target, source = F.normalize(fine, dim=1).split(list(pyramid.lengths[stage]))
+    scores = source @ target.t()
+    best, back = scores.argmax(1), scores.argmax(0)
+    mutual = (back[best] == torch.arange(len(best), device=best.device)).nonzero()[:, 0]
+    points = pyramid.clouds(stage)
+    return _row(sample, number, points[1][mutual], points[0][best[mutual]], None)
+
+
+def _row(sample: Sample, number: int, source: Tensor, target: Tensor, T: np.ndarray | None) -> Row:
+    truth = sample.targets.transform.cpu().double().numpy()
+    ratio = metrics.inlier_ratio(
+        source.cpu().double().numpy(), target.cpu().double().numpy(), truth, PROTOCOL.inlier_m
+    )
+    return Row(
+        index=number,
+        id=sample.id,
+        T=None if T is None else matrix(T),
+        T_true=matrix(truth),
+        n_matches=len(source),
+        inlier_ratio={f"{PROTOCOL.inlier_m:g}": ratio},
+    )
+
+
+def _mask_f1(target: Tensor, source: Tensor, targets: Targets) -> float:
+    predicted = torch.cat([target, source]).cpu().numpy() > 0.0
+    truth = torch.cat([targets.mask_target, targets.mask_source]).cpu().numpy()
+    return metrics.mask_scores(predicted, truth).f1
+
+
+def _mean(values: Sequence[float]) -> float:
+    return float(np.mean(values)) if len(values) else float("nan")
