@@ -62,14 +62,17 @@ def _as_array(x: Any, name: str) -> NDArray[Any]:
 
 def finite(points: Array, name: str, *, drop: bool) -> Array:
     """Refuse rows with a NaN or an infinity, or leave them out where that was asked for."""
-    good = np.isfinite(points).all(axis=1)
+    every = np.isfinite(points)
+    if every.all():
+        return points
+    good = every.all(axis=1)
     n_bad = len(points) - int(good.sum())
-    if n_bad and not drop:
+    if not drop:
         raise ValueError(
             f"{name}: {n_bad} of {len(points)} points are not finite (the first is row {int(np.argmin(good))}); "
             'remove them or pass nonfinite="drop"'
         )
-    return points[good] if n_bad else points
+    return points[good]
 
 
 def check(points: Array, name: str) -> None:
@@ -85,18 +88,20 @@ def check(points: Array, name: str) -> None:
         raise ValueError(f"{name}: the cloud is empty; it needs at least {MIN_POINTS} points")
     if len(points) < MIN_POINTS:
         raise ValueError(f"{name}: {len(points)} points are too few; it needs at least {MIN_POINTS}")
-    largest = float(np.abs(points).max())
+    # Along three rows numpy reduces several times as fast as along three columns.
+    rows = np.ascontiguousarray(points.T)
+    largest = float(np.abs(rows).max())
     if largest > _LARGEST:
         raise ValueError(
             f"{name}: a coordinate of {largest:.3g} m cannot be real; check the file and its unit"
         )
-    centred = points - points.mean(axis=0)
-    extent = np.ptp(points, axis=0)
+    centred = rows - rows.mean(axis=1, keepdims=True)
+    extent = np.ptp(rows, axis=1)
     if not extent.max() > 1e-9 * max(largest, 1e-300):
         raise ValueError(
             f"{name}: all {len(points)} points lie in one place; a pose needs points spread in space"
         )
-    spread = np.linalg.svd(centred.T @ centred / extent.max() ** 2, compute_uv=False)
+    spread = np.linalg.svd(centred @ centred.T / extent.max() ** 2, compute_uv=False)
     if spread[1] <= _THINNEST**2 * spread[0]:
         raise ValueError(
             f"{name}: all {len(points)} points lie on one line; the rotation about it is free, add points off the line"

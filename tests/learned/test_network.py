@@ -242,7 +242,7 @@ def test_bad_images_are_refused(bad: np.ndarray) -> None:
         image_tensor(bad, 36, 64)
 
 
-@pytest.mark.parametrize("stride", [2, 4, 8])
+@pytest.mark.parametrize("stride", [1, 2, 4, 8])
 def test_image_encoder_strides_and_dropout(nano: NetworkConfig, stride: int) -> None:
     assert nano.image is not None
     config = replace(nano.image, output_stride=stride, dropout=1.0)  # type: ignore[arg-type]
