@@ -4,7 +4,8 @@
     python -m benchmarks.readme real=runs/real/table.md peers=runs/peers.md
 
 replaces what stands in README.md between `<!-- real -->` and `<!-- /real -->` by that file, and so on; of a file that
-`hybridreg table` wrote, by its first protocol's caption, results and verdicts. `--page docs/simulator.md` names another page.
+`hybridreg table` wrote, by its first protocol's caption, results and verdicts. `--page docs/simulator.md` names
+another page.
 """
 
 from __future__ import annotations
