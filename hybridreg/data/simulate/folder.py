@@ -19,7 +19,6 @@ from hybridreg.data.simulate.drawn import Drawn, draw
 from hybridreg.data.simulate.jpeg import decode
 from hybridreg.data.simulate.labelled import pair_id
 from hybridreg.data.simulate.splits import pair_number
-from hybridreg.data.simulate.tiers import tier_named
 from hybridreg.data.simulate.thinned import thinned
 from hybridreg.data.simulate.tiers import tier_named
 from hybridreg.pair import LabelledPair, Pair
