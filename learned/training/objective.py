@@ -54,7 +54,7 @@ def objective(
         return Outcome(total=weights.infonce * loss, parts={"infonce": loss}, hits=hits)
     encoding = network.encode(sample.batch)
     parts: dict[str, Tensor] = {}
-    hits = None
+    hits: Tensor | None = None
     if weights.infonce:
         points = (encoding.target.points, encoding.source.points)
         features = (encoding.target.point_features, encoding.source.point_features)

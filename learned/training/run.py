@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -75,7 +76,15 @@ def train(recipe: Recipe, options: RunOptions) -> Path | None:
             network.load_state_dict(before["network"])
         fabric.to_device(network)
         progress = before["progress"] if before else Progress()
-        record = Record(options.out, progress, val, reporter, writes=not quiet, log_every=recipe.log_every)
+        record = Record(
+            options.out,
+            progress,
+            val,
+            reporter,
+            writes=not quiet,
+            log_every=recipe.log_every,
+            total=partial(_total, fabric) if fabric.world_size > 1 else None,
+        )
         loop = Loop(fabric, recipe, network, training, options.out, record, stop)
         if not loop.run(before.get("optimizer")):
             return None
@@ -110,6 +119,14 @@ def _sources(
         usable = fabric.broadcast(found.usable)
         opened.append(found.only(usable))
     return opened
+
+
+def _total(fabric: Fabric, values: torch.Tensor) -> torch.Tensor:
+    # Apple's GPUs know no float64.
+    kept = values.float() if fabric.device.type == "mps" else values
+    summed = fabric.all_reduce(kept.to(fabric.device), reduce_op="sum")
+    assert isinstance(summed, torch.Tensor)
+    return summed.cpu()
 
 
 def _device_name(fabric: Fabric) -> str:
