@@ -14,6 +14,7 @@ import torch
 from hybridreg.learned.training import checkpoint
 from hybridreg.learned.training.card import make_card, write_card
 from hybridreg.learned.training.checkpoint import Progress
+from hybridreg.learned.training.data_choice import require_data
 from hybridreg.learned.training.loop import CHECKPOINT, Loop, count_parameters
 from hybridreg.learned.training.pair_source import PairSource, open_source
 from hybridreg.learned.training.preparing import prepare_all
@@ -60,6 +61,7 @@ def train(recipe: Recipe, options: RunOptions) -> Path | None:
     ValueError, FileNotFoundError
         Data that cannot be opened, or a checkpoint of another recipe.
     """
+    require_data(recipe)
     before = _before(recipe, options)
     fabric = start_processes(options.devices, options.accelerator, recipe.precision)
     options.out.mkdir(parents=True, exist_ok=True)
