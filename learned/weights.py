@@ -18,9 +18,7 @@ from hybridreg.learned.config import NetworkConfig
 from hybridreg.learned.network import RegistrationNetwork
 from hybridreg.learned.official_names import official_name
 from hybridreg.learned.sizes import named_config
-
-CONFIG_FILE, WEIGHTS_FILE = "config.json", "model.safetensors"
-_SHIPPED = Path(__file__).resolve().parent / "weights"
+from hybridreg.shipped_weights import CONFIG_FILE, WEIGHTS_FILE, find, names
 
 
 def save_pretrained(network: RegistrationNetwork, folder: str | os.PathLike[str]) -> None:
@@ -71,13 +69,12 @@ def find_files(name_or_folder: str | os.PathLike[str]) -> list[Path]:
 
 
 def _find(name_or_folder: str | os.PathLike[str]) -> Path:
-    for folder in (Path(name_or_folder), _SHIPPED / str(name_or_folder)):
-        if (folder / CONFIG_FILE).is_file() and (folder / WEIGHTS_FILE).is_file():
-            return folder
-    known = sorted(path.parent.name for path in _SHIPPED.glob(f"*/{CONFIG_FILE}"))
+    folder = find(name_or_folder)
+    if folder is not None:
+        return folder
     raise FileNotFoundError(
         f"no {CONFIG_FILE} and {WEIGHTS_FILE} in {os.fspath(name_or_folder)!r}, and no shipped weights "
-        f"of that name; shipped are: {', '.join(known) or 'none'}"
+        f"of that name; shipped are: {', '.join(names()) or 'none'}"
     )
 
 
