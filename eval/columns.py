@@ -85,6 +85,15 @@ def by_overlap(name: str, rows: Sequence[Row], protocol: Protocol) -> Cells:
     return cells
 
 
+def masks(name: str, rows: Sequence[Row]) -> Cells:
+    """Means of the overlap mask's measures over the pairs that have one."""
+    found = [row.mask for row in rows if row.mask]
+    cells = {"method": name, "pairs": str(len(found))}
+    for key, title in (("precision", "precision"), ("recall", "recall"), ("f1", "F1"), ("iou", "IoU")):
+        cells[f"{title} %"] = percent(sum(mask[key] for mask in found) / len(found))
+    return cells
+
+
 def percent(value: float) -> str:
     """A share as percent with one digit."""
     return number(100.0 * value, 1)

@@ -10,12 +10,21 @@ from collections.abc import Sequence
 
 from hybridreg.eval import columns
 from hybridreg.eval.columns import Cells
+from hybridreg.eval.controls import MARK
 from hybridreg.eval.protocols import Protocol
 from hybridreg.eval.scoring import scene_of
 from hybridreg.eval.table import Table
 
 _LATEX = {"\\": r"\textbackslash{}", "°": r"$^\circ$", "–": "--"} | {c: f"\\{c}" for c in "&%$#_{}"}
-_LATEX |= {"<": "$<$", ">": "$>$", "~": r"\textasciitilde{}", "^": r"\textasciicircum{}"}
+_LATEX |= {
+    MARK[-1]: r"$\dagger$",
+    "<": "$<$",
+    ">": "$>$",
+    "~": r"\textasciitilde{}",
+    "^": r"\textasciicircum{}",
+}
+
+_CONTROL_NOTE = f" Lines with{MARK} are controls and no methods: their overlap was taken from the truth."
 
 
 def markdown(table: Table, protocols: Sequence[Protocol]) -> str:
@@ -25,6 +34,8 @@ def markdown(table: Table, protocols: Sequence[Protocol]) -> str:
         parts.append(f"## {protocol.name}\n\n{table.caption(protocol)} ({protocol.source}).")
         named = tables(table, protocol).items()
         parts.extend(f"### {title}\n\n{markdown_table(lines)}" for title, lines in named if lines)
+    if table.paper is not None:
+        parts.append(f"## {table.paper.heading()}\n\n{markdown_table(table.paper.cells())}")
     parts.extend(f"Not run: {name}. {problem}" for name, problem in table.problems.items())
     return "\n\n".join([*parts, fine_print(table)]) + "\n"
 
@@ -38,6 +49,7 @@ def fine_print(table: Table) -> str:
         f"{min(100.0, 300 / max(len(scenes), 1)):.0f} percentage points (the rule of three). A pair "
         "without a pose counts as the identity and never as a success. Seconds are wall time, one thread a pair; "
         f"seed {table.seed}."
+        f"{_CONTROL_NOTE if any(MARK in entry.name for entry in table.entries) else ''}"
     )
 
 
@@ -49,6 +61,9 @@ def tables(table: Table, protocol: Protocol) -> dict[str, list[Cells]]:
         "Results": [columns.results(name, score) for name, score in scores.items()],
         "Recall at fixed thresholds": [columns.thresholds(name, score) for name, score in scores.items()],
         "Recall by overlap": [columns.by_overlap(e.name, e.rows, protocol) for e in table.entries],
+        "Overlap mask": [
+            columns.masks(e.name, e.rows) for e in table.methods if any(row.mask for row in e.rows)
+        ],
         "Verdict against success": [columns.verdicts(e.name, e.rows, protocol) for e in with_verdict],
         "Seconds of each stage": columns.stages(scores),
     }
@@ -63,16 +78,18 @@ def markdown_table(lines: Sequence[Cells]) -> str:
 
 def latex(table: Table, protocols: Sequence[Protocol]) -> str:
     """The main table of every protocol, for the package booktabs."""
-    return "\n".join(_latex_table(table, protocol) for protocol in protocols)
+    parts = [_latex_table(table.caption(each), tables(table, each)["Results"]) for each in protocols]
+    if table.paper is not None:
+        parts.append(_latex_table(table.paper.heading(), table.paper.cells()))
+    return "\n".join(parts)
 
 
-def _latex_table(table: Table, protocol: Protocol) -> str:
-    lines = tables(table, protocol)["Results"]
+def _latex_table(caption: str, lines: Sequence[Cells]) -> str:
     head = list(lines[0])
     body = "\n".join(f"{' & '.join(_escape(line[key]) for key in head)} \\\\" for line in lines)
     return (
         "\\begin{table}\n\\centering\n"
-        f"\\caption{{{_escape(table.caption(protocol))}.}}\n"
+        f"\\caption{{{_escape(caption)}.}}\n"
         f"\\begin{{tabular}}{{l{'r' * (len(head) - 1)}}}\n\\toprule\n"
         f"{' & '.join(_escape(key) for key in head)} \\\\\n\\midrule\n{body}\n"
         "\\bottomrule\n\\end{tabular}\n\\end{table}\n"

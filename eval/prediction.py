@@ -12,6 +12,7 @@ from hybridreg import __version__
 from hybridreg.data.dataset import fingerprint_of, ids_of
 from hybridreg.eval import truth
 from hybridreg.eval.attempt import Method, attempt, one_line
+from hybridreg.eval.controls import Control
 from hybridreg.eval.row import Row
 from hybridreg.eval.store import Appender
 from hybridreg.eval.threads import one_thread
@@ -19,7 +20,7 @@ from hybridreg.pair import LabelledPair
 
 
 def predict(
-    method: Method,
+    method: Method | Control,
     pairs: Sequence[LabelledPair],
     path: str | os.PathLike[str],
     *,
@@ -33,7 +34,8 @@ def predict(
 
     Parameters
     ----------
-    method : Pipeline, or a function of (pair, seed) that returns a 4x4 pose, a RegistrationResult or None
+    method : Pipeline, or a function of (pair, seed) that returns a 4x4 pose, a RegistrationResult or None; or a
+        control of an ablation, which alone is told the truth
     pairs : sequence of LabelledPair
         With more than one worker it travels to them pickled, so it should read its pairs lazily.
     path : file to write
@@ -91,14 +93,17 @@ def describe(method: Any) -> dict[str, Any]:
     return {"callable": f"{named.__module__}:{named.__qualname__}", **fields}
 
 
-def predict_pair(method: Method, pairs: Sequence[LabelledPair], index: int, name: str, seed: int) -> Row:
+def predict_pair(
+    method: Method | Control, pairs: Sequence[LabelledPair], index: int, name: str, seed: int
+) -> Row:
     """The row of one pair; an error anywhere becomes a failed row."""
     with one_thread():
         try:
             labelled = pairs[index]
         except Exception as error:
             return Row(index=index, id=name, error=one_line(error))
-        tried = attempt(method, labelled.pair, seed)
+        told, pair = method.told(labelled) if isinstance(method, Control) else (method, labelled.pair)
+        tried = attempt(told, pair, seed)
         try:
             return truth.row(index, labelled, tried)
         except Exception as error:
@@ -106,7 +111,7 @@ def predict_pair(method: Method, pairs: Sequence[LabelledPair], index: int, name
 
 
 def _rows(
-    method: Method,
+    method: Method | Control,
     pairs: Sequence[LabelledPair],
     ids: Sequence[str],
     missing: list[int],
@@ -126,7 +131,7 @@ def _rows(
 
 
 def _parallel(
-    method: Method,
+    method: Method | Control,
     pairs: Sequence[LabelledPair],
     ids: Sequence[str],
     indices: list[int],
@@ -142,7 +147,7 @@ def _parallel(
 
 
 def _one_by_one(
-    method: Method, pairs: Sequence[LabelledPair], ids: Sequence[str], indices: list[int], seed: int
+    method: Method | Control, pairs: Sequence[LabelledPair], ids: Sequence[str], indices: list[int], seed: int
 ) -> Iterator[Row]:
     from joblib.externals.loky import ProcessPoolExecutor
     from joblib.externals.loky.process_executor import TerminatedWorkerError

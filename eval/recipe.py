@@ -14,15 +14,22 @@ from pathlib import Path
 from typing import Any
 
 from hybridreg import changes
+from hybridreg.eval import paper
 from hybridreg.eval.attempt import Method
+from hybridreg.eval.controls import MARK, Control
+from hybridreg.eval.paper import Printed
 from hybridreg.eval.protocols import Protocol, protocol
+from hybridreg.pipeline import Pipeline
+from hybridreg.shipped_weights import MissingWeights
 
 if sys.version_info >= (3, 11):
     import tomllib
 else:
     import tomli as tomllib
 
-_KEYS = {"title", "data", "protocols", "seed", "starts", "base", "row", "sweep"}
+_KEYS = {"title", "data", "protocols", "seed", "starts", "base", "row", "sweep", "paper"}
+# What makes a line a control: a pipeline that knows more, or sees less, than a method does.
+_CONTROLS = ("oracle", "image")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -30,7 +37,7 @@ class Line:
     """One line of a table: a method, or why the stages asked for do not fit together."""
 
     name: str
-    method: Method | None
+    method: Method | Control | None
     problem: str = ""
 
 
@@ -41,6 +48,7 @@ class Recipe:
     Attributes
     ----------
     starts : how often each pair is repeated with its source under a random yaw
+    paper : figures that somebody printed, to be shown apart
     """
 
     title: str
@@ -49,6 +57,7 @@ class Recipe:
     seed: int = 0
     starts: int = 0
     lines: tuple[Line, ...]
+    paper: Printed | None = None
 
 
 def known() -> list[str]:
@@ -99,6 +108,7 @@ def parse(table: Mapping[str, Any], *, title: str = "table") -> Recipe:
         seed=table.get("seed", 0),
         starts=table.get("starts", 0),
         lines=tuple(lines),
+        paper=paper.parse(table["paper"]) if "paper" in table else None,
     )
 
 
@@ -127,9 +137,14 @@ def _shipped() -> Any:
 def _rows(base: Mapping[str, Any], rows: list[dict[str, Any]]) -> Iterator[Line]:
     for row in rows:
         changed = {key: value for key, value in row.items() if key != "name"}
-        yield Line(
-            name=row.get("name") or title_of(changed), method=changes.build(changes.merge(base, changed))
-        )
+        name, merged = row.get("name") or title_of(changed), changes.merge(base, changed)
+        try:
+            method = _build(merged)
+        except MissingWeights as error:
+            yield Line(name=name, method=None, problem=str(error))
+        else:
+            oracle = isinstance(method, Control) and method.oracle
+            yield Line(name=f"{name}{MARK}" if oracle else name, method=method)
 
 
 def _grid(base: Mapping[str, Any], sweep: Mapping[str, Any]) -> Iterator[Line]:
@@ -143,9 +158,21 @@ def _grid(base: Mapping[str, Any], sweep: Mapping[str, Any]) -> Iterator[Line]:
             slot, _, field = key.partition(".")
             changed = changes.merge(changed, {slot: {field: value} if field else value})
         try:
-            yield Line(name=title_of(changed), method=changes.build(changes.merge(base, changed)))
-        except ValueError as error:
+            yield Line(name=title_of(changed), method=_build(changes.merge(base, changed)))
+        except (ValueError, MissingWeights) as error:
             yield Line(name=title_of(changed), method=None, problem=str(error))
+
+
+def _build(changed: Mapping[str, Any]) -> Pipeline | Control:
+    pipeline = changes.build({key: value for key, value in changed.items() if key not in _CONTROLS})
+    oracle, image = changed.get("oracle", ""), changed.get("image", True)
+    if oracle not in ("", "overlap"):
+        raise ValueError(f"oracle = {oracle!r}: only 'overlap' can be told from the truth")
+    if not isinstance(image, bool):
+        raise ValueError(f"image = {image!r}: expected true or false")
+    if image and not oracle:
+        return pipeline
+    return Control(pipeline=pipeline, oracle=bool(oracle), image=image)
 
 
 def _axes(sweep: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, list[Any]]]:

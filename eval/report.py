@@ -57,6 +57,8 @@ def html(table: Table, protocols: Sequence[Protocol], pairs: Sequence[LabelledPa
     body = [page.heading(table.title, 1), page.paragraph(formats.fine_print(table))]
     for protocol in protocols:
         body += _protocol_part(table, protocol)
+    if table.paper is not None:
+        body += [page.heading(table.paper.heading()), page.html_table(table.paper.cells())]
     body += [page.heading("Every pair"), page.paragraph(f"By protocol {protocols[0].name}.")]
     lines = [line for entry in table.methods for line in _pair_lines(entry, protocols[0])]
     if lines:

@@ -11,7 +11,8 @@ from pathlib import Path
 from typing import Any
 
 from hybridreg.data.starts import YawStarts
-from hybridreg.eval import scoring, store
+from hybridreg.eval import paper, scoring, store
+from hybridreg.eval.paper import Printed
 from hybridreg.eval.prediction import predict
 from hybridreg.eval.protocols import Protocol
 from hybridreg.eval.recipe import Recipe, slug
@@ -41,6 +42,7 @@ class Table:
     entries : the identity first, then the methods
     starts : turned copies of each pair
     problems : lines that could not be built, with the reason
+    paper : figures that somebody printed, to be shown apart
     """
 
     title: str
@@ -49,6 +51,7 @@ class Table:
     starts: int
     entries: list[Entry]
     problems: dict[str, str] = field(default_factory=dict)
+    paper: Printed | None = None
 
     @property
     def methods(self) -> list[Entry]:
@@ -89,8 +92,12 @@ def run(
     Raises
     ------
     ValueError
-        `out` holds predictions of another configuration.
+        No line can be run, or `out` holds predictions of another configuration.
     """
+    if all(line.method is None for line in recipe.lines):
+        raise ValueError(
+            f"none of {len(recipe.lines)} lines can be run; the first: {recipe.lines[0].problem}"
+        )
     folder = Path(out)
     (folder / "predictions").mkdir(parents=True, exist_ok=True)
     tried = YawStarts(pairs, recipe.starts, recipe.seed) if recipe.starts else pairs
@@ -115,6 +122,7 @@ def run(
         "protocols": [protocol.name for protocol in recipe.protocols],
         "lines": list(lines),
         "problems": {line.name: line.problem for line in recipe.lines if line.method is None},
+        "paper": None if recipe.paper is None else recipe.paper.to_dict(),
     }
     write_json(folder / _INDEX, index)
     return load(folder)
@@ -136,6 +144,7 @@ def load(folder: str | os.PathLike[str]) -> Table:
         seed=index["seed"],
         starts=index["starts"],
         problems=index["problems"],
+        paper=paper.parse(index["paper"]) if index.get("paper") else None,
         entries=_with_identity(entries),
     )
 

@@ -11,6 +11,7 @@ from scipy.spatial import cKDTree
 from hybridreg import se3
 from hybridreg.eval import metrics
 from hybridreg.eval.attempt import Attempt
+from hybridreg.eval.controls import near
 from hybridreg.eval.protocols import INLIER_RADII
 from hybridreg.eval.row import Matrix, Row, matrix
 from hybridreg.frames import lower_pose
@@ -119,11 +120,5 @@ def _mask(trace: Trace, labelled: LabelledPair) -> dict[str, float] | None:
     scene = trace.scene
     moved, target = se3.apply(truth, scene.source.points), scene.target.points
     radius = 2.0 * scene.spacing
-    seen = [_near(moved, target, radius), _near(target, moved, radius)]
+    seen = [near(moved, target, radius), near(target, moved, radius)]
     return metrics.mask_scores(predicted > 0.5, np.concatenate(seen))._asdict()
-
-
-def _near(points: metrics.Array, others: metrics.Array, radius: float) -> metrics.Bools:
-    distance, _ = cKDTree(others).query(points, distance_upper_bound=radius)
-    near: metrics.Bools = np.isfinite(distance)
-    return near

@@ -7,7 +7,7 @@ import sys
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from hybridreg import presets
+from hybridreg import presets, shipped_weights
 from hybridreg.pipeline import Pipeline
 from hybridreg.slots import SLOTS
 from hybridreg.spec import to_table
@@ -33,6 +33,8 @@ def build(changes: Mapping[str, Any]) -> Pipeline:
     ------
     KeyError, ValueError
         A name, key or field that does not exist; stages that do not fit together.
+    MissingWeights
+        A stage's weights are not here.
     """
     unknown = set(changes) - set(KEYS)
     if unknown:
@@ -42,10 +44,14 @@ def build(changes: Mapping[str, Any]) -> Pipeline:
             f"preset={changes['preset']!r} and pipeline={changes['pipeline']!r}: leave one of them out"
         )
     if "pipeline" in changes:
-        start = Pipeline.load(changes["pipeline"])
+        start, what = Pipeline.load(changes["pipeline"]), f"pipeline {changes['pipeline']}"
     else:
-        start = Pipeline.preset(changes.get("preset", presets.DEFAULT))
-    return apply(start, {key: value for key, value in changes.items() if key in SLOTS or key == "voxel"})
+        name = changes.get("preset", presets.DEFAULT)
+        start, what = Pipeline(**presets.load(name)), f"preset {name!r}"
+    built = apply(start, {key: value for key, value in changes.items() if key in SLOTS or key == "voxel"})
+    # Now, not before: the weights may be what was changed.
+    shipped_weights.require({slot: getattr(built, slot) for slot in SLOTS}, what)
+    return built
 
 
 def apply(pipeline: Pipeline, changes: Mapping[str, Any]) -> Pipeline:

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hybridreg import fitting, presets, spec
+from hybridreg import fitting, presets, shipped_weights, spec
 from hybridreg.frames import lower_matches, raise_matches, raise_pose
 from hybridreg.matches import Correspondences, Overlap, Pose
 from hybridreg.pair import Pair
@@ -70,8 +70,18 @@ class Pipeline(Stage):
 
     @classmethod
     def preset(cls, name: str, *, voxel: float | None = None) -> Pipeline:
-        """Pipeline of a name that `hybridreg.presets.names()` lists."""
-        return cls(voxel=voxel, **presets.load(name))
+        """Pipeline of a name that `hybridreg.presets.names()` lists.
+
+        Raises
+        ------
+        KeyError
+            No preset of that name.
+        MissingWeights
+            It needs weights that do not come with this version; a FileNotFoundError.
+        """
+        slots = presets.load(name)
+        shipped_weights.require(slots, f"preset {name!r}")
+        return cls(voxel=voxel, **slots)
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Pipeline:

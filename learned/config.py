@@ -4,10 +4,11 @@
 from __future__ import annotations
 
 import dataclasses
-import typing
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
+
+from hybridreg.learned.plain_values import build
 
 DEFAULT_NEIGHBOR_LIMITS = (65, 80, 60, 60, 65)
 
@@ -194,21 +195,4 @@ class NetworkConfig:
     @staticmethod
     def from_dict(values: Mapping[str, Any]) -> NetworkConfig:
         """Build from plain values; an unknown key raises ``ValueError`` that names it."""
-        config = _build(NetworkConfig, values, "config")
-        assert isinstance(config, NetworkConfig)
-        return config
-
-
-def _build(cls: type, values: Mapping[str, Any], where: str) -> Any:
-    hints = typing.get_type_hints(cls)
-    unknown = sorted(set(values) - set(hints))
-    if unknown:
-        raise ValueError(f"{where}: unknown keys {unknown}; known are {sorted(hints)}")
-    return cls(**{name: _value(hints[name], value, f"{where}.{name}") for name, value in values.items()})
-
-
-def _value(hint: Any, value: Any, where: str) -> Any:
-    parts = [part for part in (typing.get_args(hint) or (hint,)) if dataclasses.is_dataclass(part)]
-    if parts and value is not None:
-        return _build(typing.cast(type, parts[0]), value, where)
-    return tuple(value) if isinstance(value, list) else value
+        return build(NetworkConfig, values, "config")

@@ -5,22 +5,20 @@ from __future__ import annotations
 
 import json
 import os
-import tempfile
 from collections.abc import Mapping
 from pathlib import Path
 
 import torch
 from safetensors import SafetensorError
-from safetensors.torch import load_file, save_file
+from safetensors.torch import load_file, save
 from torch import Tensor, nn
 
+from hybridreg.io.atomic import write_bytes, write_text
 from hybridreg.learned.config import NetworkConfig
 from hybridreg.learned.network import RegistrationNetwork
 from hybridreg.learned.official_names import official_name
 from hybridreg.learned.sizes import named_config
-
-CONFIG_FILE, WEIGHTS_FILE = "config.json", "model.safetensors"
-_SHIPPED = Path(__file__).resolve().parent / "weights"
+from hybridreg.shipped_weights import CONFIG_FILE, WEIGHTS_FILE, find, names
 
 
 def save_pretrained(network: RegistrationNetwork, folder: str | os.PathLike[str]) -> None:
@@ -29,11 +27,9 @@ def save_pretrained(network: RegistrationNetwork, folder: str | os.PathLike[str]
     folder.mkdir(parents=True, exist_ok=True)
     text = json.dumps(network.config.to_dict(), indent=1) + "\n"
     tensors = {name: tensor.detach().cpu().contiguous() for name, tensor in network.state_dict().items()}
-    with tempfile.TemporaryDirectory(dir=folder) as scratch:
-        (Path(scratch) / CONFIG_FILE).write_text(text, encoding="utf-8")
-        save_file(tensors, Path(scratch) / WEIGHTS_FILE)
-        for name in (WEIGHTS_FILE, CONFIG_FILE):
-            (Path(scratch) / name).replace(folder / name)
+    # Serialised here: safetensors would replace the file by one that its owner alone can read.
+    write_bytes(folder / WEIGHTS_FILE, save(tensors))
+    write_text(folder / CONFIG_FILE, text)
 
 
 def from_pretrained(name_or_folder: str | os.PathLike[str]) -> RegistrationNetwork:
@@ -73,13 +69,12 @@ def find_files(name_or_folder: str | os.PathLike[str]) -> list[Path]:
 
 
 def _find(name_or_folder: str | os.PathLike[str]) -> Path:
-    for folder in (Path(name_or_folder), _SHIPPED / str(name_or_folder)):
-        if (folder / CONFIG_FILE).is_file() and (folder / WEIGHTS_FILE).is_file():
-            return folder
-    known = sorted(path.parent.name for path in _SHIPPED.glob(f"*/{CONFIG_FILE}"))
+    folder = find(name_or_folder)
+    if folder is not None:
+        return folder
     raise FileNotFoundError(
         f"no {CONFIG_FILE} and {WEIGHTS_FILE} in {os.fspath(name_or_folder)!r}, and no shipped weights "
-        f"of that name; shipped are: {', '.join(known) or 'none'}"
+        f"of that name; shipped are: {', '.join(names()) or 'none'}"
     )
 
 

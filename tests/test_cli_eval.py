@@ -184,7 +184,7 @@ def test_list_names_everything() -> None:
         assert part in text
     presets = call("list", "presets").stdout
     assert "icp" in presets
-    assert "cross3dreg" not in presets
+    assert "sim" not in presets
 
 
 def test_doctor_tells_versions_and_survives_what_does_not_load(monkeypatch: pytest.MonkeyPatch) -> None:

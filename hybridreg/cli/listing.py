@@ -43,7 +43,7 @@ def lines(kind: Kind) -> Iterator[str]:
     if kind is Kind.stages:
         yield from (f"{slot}: {', '.join(registry.names(slot))}" for slot in SLOTS)
     elif kind is Kind.presets:
-        yield from (f"{n} (default)" if n == presets.DEFAULT else n for n in presets.names())
+        yield from (f"{name}{_remark(name)}" for name in presets.names())
     elif kind is Kind.datasets:
         yield "a folder of pairs, by its path"
         yield from (f"{name}:..." for name in catalogue.names())
@@ -53,3 +53,13 @@ def lines(kind: Kind) -> Iterator[str]:
         yield from recipes.names()
     else:
         yield from (each.describe().removeprefix("protocol ") for each in protocols.PROTOCOLS.values())
+
+
+def _remark(preset: str) -> str:
+    from hybridreg import presets, shipped_weights
+
+    try:
+        shipped_weights.require(presets.load(preset), preset)
+    except shipped_weights.MissingWeights:
+        return " (its weights do not come with this version)"
+    return " (default)" if preset == presets.DEFAULT else ""

@@ -56,6 +56,8 @@ def write(
 
     for protocol in protocols:
         print_table(done.caption(protocol), formats.tables(done, protocol)["Results"])
+    if done.paper is not None:
+        print_table(done.paper.heading(), done.paper.cells())
     for name, problem in done.problems.items():
         print(f"not run: {name}. {problem}")
     files = report.write(done, protocols, out, pairs)

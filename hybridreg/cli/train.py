@@ -18,7 +18,8 @@ def command(
     data: Annotated[
         list[str] | None,
         typer.Option(
-            help="Training data instead of the recipe's; NAME=DATA replaces one source. Repeatable."
+            help="Training data instead of the recipe's; NAME=DATA replaces one source, or gives a folder that the "
+            "recipe leaves open. Repeatable."
         ),
     ] = None,
     out: Annotated[Path | None, typer.Option(help="Folder; runs/<recipe's name> if not given.")] = None,
@@ -32,12 +33,12 @@ def command(
     workers: options.Workers = 1,
 ) -> None:
     """Train a network; stopped or killed, it goes on with --resume. Ends with weights and their card."""
-    from hybridreg.learned.training import recipe_file
+    from hybridreg.learned.training import data_choice, recipe_file
     from hybridreg.learned.training.run import RunOptions, train
 
     wanted = recipe_file.read(recipe)
     if data:
-        wanted = recipe_file.with_data(wanted, data)
+        wanted = data_choice.with_data(wanted, data)
     if steps_scale != 1.0:
         wanted = recipe_file.scaled(wanted, steps_scale)
     folder = out or Path("runs") / wanted.name

@@ -49,6 +49,10 @@ class Augmentation:
         """Does it change the neighbours?"""
         return self.scale != (1.0, 1.0)
 
+    def draw_scale(self, rng: np.random.Generator) -> float:
+        """A factor from the range; the generator is left alone where there is none to choose from."""
+        return float(rng.uniform(self.scale[0], self.scale[1])) if self.rescales else 1.0
+
 
 def draw_motions(augmentation: Augmentation, rng: np.random.Generator) -> tuple[Array, Array]:
     """Random motions (4, 4) of the target and of the source."""

@@ -22,6 +22,7 @@ class StepOutcome:
     bad: tuple[int, ...]  # places in the step's batch whose loss was not finite
     stepped: bool
     stop: bool  # a process was asked to stop
+    due: bool  # a process holds that it is time for a checkpoint
 
 
 def finish_step(
@@ -31,6 +32,7 @@ def finish_step(
     bad: Tensor,
     clip: float,
     stop: bool,
+    due: bool = False,
 ) -> StepOutcome:
     """Add up the processes' gradients, clip, and step; a step with anything not finite is skipped by all.
 
@@ -44,17 +46,19 @@ def finish_step(
         Longest gradient.
     stop
         Was this process asked to stop?
+    due
+        Is it time for a checkpoint by this process's clock? Clocks differ, and all must go to the same barrier.
     """
-    votes = torch.cat([bad, bad.new_tensor([float(stop)])])
+    votes = torch.cat([bad, bad.new_tensor([float(stop), float(due)])])
     if fabric.world_size > 1:
         votes = _share(fabric, parameters, votes)
-    places = tuple(votes[:-1].nonzero()[:, 0].tolist())
+    places = tuple(votes[:-2].nonzero()[:, 0].tolist())
     norm = float(nn.utils.clip_grad_norm_([p for p in parameters if p.grad is not None], clip))
     stepped = not places and norm == norm and norm != float("inf")
     if stepped:
         optimizer.step()
     optimizer.zero_grad(set_to_none=True)
-    return StepOutcome(norm=norm, bad=places, stepped=stepped, stop=bool(votes[-1]))
+    return StepOutcome(norm=norm, bad=places, stepped=stepped, stop=bool(votes[-2]), due=bool(votes[-1]))
 
 
 def _share(fabric: Fabric, parameters: Sequence[nn.Parameter], votes: Tensor) -> Tensor:

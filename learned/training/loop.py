@@ -75,13 +75,15 @@ class Loop:
         for step in range(self.progress.step, steps):
             set_rate(optimizer, rate_at(phase, step, steps))
             bad = self._gather(phase, upcoming, step * batch, batch)
-            outcome = finish_step(self.fabric, optimizer, parameters, bad, self.recipe.clip, self.stop.asked)
-            self._note(outcome, samples, step * batch)
+            votes = (self.stop.asked, self._due())
+            outcome = finish_step(self.fabric, optimizer, parameters, bad, self.recipe.clip, *votes)
+            self._note(outcome, samples, range(step * batch, (step + 1) * batch))
             self.record.step(phase, step, rate_at(phase, step, steps), outcome.norm)
             last = step + 1 == steps
             if last or (self.recipe.every and (step + 1) % self.recipe.every == 0):
                 self._validate(phase)
-            self._save_when_due(optimizer, outcome.stop)
+            if outcome.stop or outcome.due:
+                self._save(optimizer)
             if outcome.stop and not last:
                 return False
         return True
@@ -101,7 +103,7 @@ class Loop:
                 continue
             outcome = self._forward(phase, sample.to(self.fabric.device))
             if bool(torch.isfinite(outcome.total)):
-                (outcome.total / batch).backward()  # type: ignore[no-untyped-call]
+                (outcome.total / batch).backward()
                 self.record.outcome(self.network, outcome, sample)
             else:
                 bad[place] = 1.0
@@ -146,27 +148,28 @@ class Loop:
     def _seed(self) -> tuple[int, int]:
         return self.recipe.seed, self.progress.phase
 
-    def _note(self, outcome: StepOutcome, samples: PhaseSamples, first: int) -> None:
+    def _note(self, outcome: StepOutcome, samples: PhaseSamples, numbers: range) -> None:
         self.progress.step += 1
         self.progress.total += 1
         if outcome.stepped:
             return
-        names = [samples.id_of(first + place) for place in outcome.bad] or ["gradient"]
+        # A gradient that is not finite may come from any pair of the step.
+        what = "loss" if outcome.bad else "gradient"
+        names = [samples.id_of(numbers[place]) for place in outcome.bad or range(len(numbers))]
         for name in names:
             self.progress.skipped[name] = self.progress.skipped.get(name, 0) + 1
-        _log.warning("step %d skipped, not finite: %s", self.progress.step, ", ".join(names))
+        _log.warning("step %d skipped, %s not finite: %s", self.progress.step, what, ", ".join(names))
 
     def _validate(self, phase: Phase) -> None:
         if self.fabric.is_global_zero:
             self.record.validate(self.network, phase, self.fabric.device)
         self.fabric.barrier()
 
-    def _save_when_due(self, optimizer: torch.optim.Optimizer, stop: bool) -> None:
-        minutes = (time.monotonic() - self._saved) / 60.0
-        if stop or minutes >= self.recipe.checkpoint_minutes:
-            self._save(optimizer)
+    def _due(self) -> bool:
+        return (time.monotonic() - self._saved) / 60.0 >= self.recipe.checkpoint_minutes
 
     def _save(self, optimizer: torch.optim.Optimizer | None) -> None:
+        self.record.collect()
         if self.fabric.is_global_zero:
             self.record.keep_time()
             checkpoint.save(

@@ -48,13 +48,13 @@ def objective(
     generator: torch.Generator,
 ) -> Outcome:
     """Losses of a sample, ready for ``backward``. The network must be in training mode."""
+    hits: Tensor | None = None
     if not weights.matcher:
         points, features = _fine_features(network, sample)
         loss, hits = contrastive_loss(network, sample, points, features, contrast, generator)
         return Outcome(total=weights.infonce * loss, parts={"infonce": loss}, hits=hits)
     encoding = network.encode(sample.batch)
     parts: dict[str, Tensor] = {}
-    hits = None
     if weights.infonce:
         points = (encoding.target.points, encoding.source.points)
         features = (encoding.target.point_features, encoding.source.point_features)

@@ -6,7 +6,7 @@ from __future__ import annotations
 import dataclasses
 import os
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +14,7 @@ from hybridreg.learned import recipes
 from hybridreg.learned.config import NetworkConfig
 from hybridreg.learned.plain_values import build
 from hybridreg.learned.sizes import named_config
-from hybridreg.learned.training.recipe import Phase, Recipe, Source
+from hybridreg.learned.training.recipe import Phase, Recipe
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -58,18 +58,6 @@ def network_of(size: str, *, omp: bool, vgam: bool, changes: Mapping[str, Any]) 
     return NetworkConfig.from_dict(merged)
 
 
-def with_data(recipe: Recipe, texts: Sequence[str]) -> Recipe:
-    """The recipe on other training data: ``NAME=TEXT`` puts TEXT in a source's place, bare texts replace them all."""
-    named = {source.title: source for source in recipe.data.train}
-    replaced = [text.partition("=") for text in texts]
-    if all(equals and name in named for name, equals, _ in replaced):
-        for name, _, text in replaced:
-            named[name] = dataclasses.replace(named[name], data=text, name=name)
-        return _on(recipe, tuple(named.values()), recipe.phase)
-    phases = tuple(dataclasses.replace(phase, data={}) for phase in recipe.phase)
-    return _on(recipe, tuple(Source(data=text) for text in texts), phases)
-
-
 def scaled(recipe: Recipe, factor: float) -> Recipe:
     """The recipe with all phases longer or shorter by a factor."""
     if not factor > 0:
@@ -85,11 +73,6 @@ def _scaled(phase: Phase, factor: float) -> Phase:
         warmup=round(phase.warmup * factor),
         decay_every=phase.decay_every * factor,
     )
-
-
-def _on(recipe: Recipe, train: tuple[Source, ...], phases: tuple[Phase, ...]) -> Recipe:
-    data = dataclasses.replace(recipe.data, train=train)
-    return dataclasses.replace(recipe, data=data, phase=phases)
 
 
 def _merged(base: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:

@@ -4,17 +4,18 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict
 from pathlib import Path
 
 import torch
+from torch import Tensor
 
 from hybridreg.learned.network import RegistrationNetwork
 from hybridreg.learned.procrustes import apply_transform
 from hybridreg.learned.training.checkpoint import Progress
-from hybridreg.learned.training.log import CurveFile
+from hybridreg.learned.training.log import CurveFile, Value
 from hybridreg.learned.training.objective import Outcome
 from hybridreg.learned.training.pair_source import PairSource
 from hybridreg.learned.training.recipe import Phase
@@ -29,7 +30,10 @@ _VALIDATION = tuple(Validation.__dataclass_fields__)
 
 
 class Record:
-    """Sums between two lines of the log, and the files of the run. Only the first process writes."""
+    """Sums between two lines of the log, and the files of the run.
+
+    Only the first process ``writes``; ``total`` adds up a tensor over all processes.
+    """
 
     def __init__(
         self,
@@ -40,14 +44,18 @@ class Record:
         *,
         writes: bool,
         log_every: int,
+        total: Callable[[Tensor], Tensor] | None = None,
     ) -> None:
         self.out, self.progress, self.val = out, progress, val
         self.reporter, self.writes, self.log_every = reporter, writes, log_every
+        self._total = total
         self.curve = CurveFile(out / "log.csv", _COLUMNS)
         self.validations = CurveFile(out / "validation.csv", ("phase", *_VALIDATION))
         if writes:
             self.curve.begin(progress.total)
             self.validations.begin(progress.total)
+        else:  # the checkpoint's sums are those of all processes, and the first one has them
+            progress.window.clear()
         self._clock = self._line_clock = time.monotonic()
         self._data_seconds, self._line_steps = 0.0, 0
 
@@ -81,8 +89,9 @@ class Record:
         self.reporter.advance()
         if (step + 1) % self.log_every:
             return
+        self.collect()
         seconds = max(time.monotonic() - self._line_clock, 1e-9)
-        row = {
+        row: dict[str, Value] = {
             "total": self.progress.total,
             "phase": phase.name,
             "step": step + 1,
@@ -97,6 +106,19 @@ class Record:
             self.reporter.line(row)
         self.progress.window.clear()
         self._line_clock, self._line_steps, self._data_seconds = time.monotonic(), 0, 0.0
+
+    def collect(self) -> None:
+        """Bring the sums of all processes to the first one; all must call it at the same step."""
+        if self._total is None:
+            return
+        window = self.progress.window
+        sums = self._total(
+            torch.tensor([window.get(name, [0.0, 0.0]) for name in _MEANS], dtype=torch.float64)
+        )
+        window.clear()
+        if self.writes:
+            found = zip(_MEANS, sums.tolist(), strict=True)
+            window.update({name: [total, count] for name, (total, count) in found if count})
 
     def validate(self, network: RegistrationNetwork, phase: Phase, device: torch.device) -> None:
         """Measure the network, keep it as ``last/``, and as ``best/`` where it is."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,6 +14,7 @@ import torch
 from hybridreg.learned.training import checkpoint
 from hybridreg.learned.training.card import make_card, write_card
 from hybridreg.learned.training.checkpoint import Progress
+from hybridreg.learned.training.data_choice import require_data
 from hybridreg.learned.training.loop import CHECKPOINT, Loop, count_parameters
 from hybridreg.learned.training.pair_source import PairSource, open_source
 from hybridreg.learned.training.preparing import prepare_all
@@ -59,6 +61,7 @@ def train(recipe: Recipe, options: RunOptions) -> Path | None:
     ValueError, FileNotFoundError
         Data that cannot be opened, or a checkpoint of another recipe.
     """
+    require_data(recipe)
     before = _before(recipe, options)
     fabric = start_processes(options.devices, options.accelerator, recipe.precision)
     options.out.mkdir(parents=True, exist_ok=True)
@@ -71,7 +74,15 @@ def train(recipe: Recipe, options: RunOptions) -> Path | None:
             network.load_state_dict(before["network"])
         fabric.to_device(network)
         progress = before["progress"] if before else Progress()
-        record = Record(options.out, progress, val, reporter, writes=not quiet, log_every=recipe.log_every)
+        record = Record(
+            options.out,
+            progress,
+            val,
+            reporter,
+            writes=not quiet,
+            log_every=recipe.log_every,
+            total=partial(_total, fabric) if fabric.world_size > 1 else None,
+        )
         # While pairs are being prepared a signal ends the process at once: what is prepared lies on the disk.
         with stop_on_signals() as stop:
             loop = Loop(fabric, recipe, network, training, options.out, record, stop)
@@ -108,6 +119,14 @@ def _sources(
         usable = fabric.broadcast(found.usable)
         opened.append(found.only(usable))
     return opened
+
+
+def _total(fabric: Fabric, values: torch.Tensor) -> torch.Tensor:
+    # Apple's GPUs know no float64.
+    kept = values.float() if fabric.device.type == "mps" else values
+    summed = fabric.all_reduce(kept.to(fabric.device), reduce_op="sum")
+    assert isinstance(summed, torch.Tensor)
+    return summed.cpu()
 
 
 def _device_name(fabric: Fabric) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import torch
@@ -57,7 +58,7 @@ class Unusable:
     problem: str
 
 
-class PhaseSamples(Dataset):  # type: ignore[type-arg]
+class PhaseSamples(Dataset[Any]):
     """All samples of a phase by number; each has a random generator of its own, so that order does not matter."""
 
     def __init__(
@@ -73,7 +74,7 @@ class PhaseSamples(Dataset):  # type: ignore[type-arg]
         source, pair = self.order[number]
         rng = np.random.default_rng([*self.seed, 2, number])
         try:
-            scale = float(rng.uniform(*self.augmentation.scale)) if self.augmentation.rescales else 1.0
+            scale = self.augmentation.draw_scale(rng)
             prepared = self.sources[source].load(pair, scale)
         except Exception as error:  # a bad pair is a skipped step, named in the log
             name = self.id_of(number)
@@ -126,7 +127,7 @@ def stream(samples: PhaseSamples, numbers: Iterable[int], loaders: int) -> Itera
     return iter(loader)
 
 
-def _as_it_is(sample: Sample | Unusable) -> Sample | Unusable:
+def _as_it_is(sample: Any) -> Any:
     return sample
 
 

@@ -35,9 +35,12 @@ def _take_over(network: RegistrationNetwork, start: str) -> None:
     shared = {name: tensor for name, tensor in found.items() if name in own}
     wrong = [name for name, tensor in shared.items() if tensor.shape != own[name].shape]
     if wrong or not shared:
-        reason = (
-            f"tensor {wrong[0]} has another shape" if wrong else "no tensor bears a name of this network's"
-        )
+        reason = "no tensor bears a name of this network's"
+        if wrong:
+            shapes = tuple(found[wrong[0]].shape), tuple(own[wrong[0]].shape)
+            reason = (
+                f"tensor {wrong[0]} has shape {shapes[0]}, not {shapes[1]}; choose the network that it is of"
+            )
         raise ValueError(f"start={start!r}: {reason}")
     network.load_state_dict(shared, strict=False)
     fresh = sorted({name.partition(".")[0] for name in own if name not in shared})

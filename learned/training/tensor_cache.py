@@ -9,10 +9,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from safetensors import SafetensorError
-from safetensors.torch import load_file, save_file
+from safetensors.torch import load_file, save
 from torch import Tensor
 
-from hybridreg.io.atomic import atomic_path
+from hybridreg.io.atomic import write_bytes
 
 Tensors = Mapping[str, Tensor]
 
@@ -49,6 +49,5 @@ class TensorCache:
                 path.unlink(missing_ok=True)
         tensors = make()
         path.parent.mkdir(parents=True, exist_ok=True)
-        with atomic_path(path) as temporary:
-            save_file({name: tensor.contiguous() for name, tensor in tensors.items()}, temporary)
+        write_bytes(path, save({name: tensor.contiguous() for name, tensor in tensors.items()}))
         return tensors

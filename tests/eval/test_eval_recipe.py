@@ -73,7 +73,10 @@ def test_a_combination_that_does_not_fit_stays_with_its_reason() -> None:
     ("table", "told"),
     [
         ({}, "no [[row]] and no [sweep]"),
-        ({"rows": []}, "rows: unknown; a table has base, data, protocols, row, seed, starts, sweep, title"),
+        (
+            {"rows": []},
+            "rows: unknown; a table has base, data, paper, protocols, row, seed, starts, sweep, title",
+        ),
         ({"row": [{"preset": "icp"}, {"preset": "icp"}]}, "two lines are called 'icp'"),
         ({"row": [{"preset": "icp", "refin": "none"}]}, "refin: unknown"),
         ({"base": BASE, "sweep": {"refine": "icp"}}, "sweep refine: expected a list of values, got 'icp'"),

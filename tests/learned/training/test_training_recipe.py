@@ -1,0 +1,134 @@
+# SPDX-License-Identifier: MIT
+"""Recipes: what they mean, and what they say when they mean nothing."""
+
+from __future__ import annotations
+
+import dataclasses
+import re
+from pathlib import Path
+from typing import Any
+
+import pytest
+from training_runs import MakeRecipe, write_recipe
+from typer.testing import CliRunner
+
+from hybridreg.cli.app import app
+from hybridreg.learned import recipes
+from hybridreg.learned.training import data_choice, recipe_file
+from hybridreg.learned.training.recipe import Phase
+from hybridreg.learned.training.schedule import rate_at, steps_of
+
+PHASE = {"name": "p", "steps": 2}
+
+
+@pytest.mark.parametrize(
+    ("changes", "told"),
+    [
+        ({"sed": 1}, r"recipe: unknown keys \['sed'\]; known are .*'seed'"),
+        ({"seed": "one"}, r"recipe\.seed: expected a number, got 'one'"),
+        ({"size": "huge"}, "unknown size 'huge'; known are full, small"),
+        ({"network": {"backbone": {"voxle": 1.0}}}, r"backbone: unknown keys \['voxle'\]"),
+        (
+            {"network": {"backbone": {"kernel": "round"}}},
+            r"backbone\.kernel: expected one of 'spatial', 'cyl",
+        ),
+        ({"precision": "16"}, r"recipe\.precision: expected one of '32-true', 'bf16-mixed'"),
+        ({"phase": []}, r"a recipe needs at least one \[\[phase\]\]"),
+        ({"phase": [{"steps": 2}]}, r"recipe\.phase\[0\]: name missing"),
+        (
+            {"phase": [{**PHASE, "losses": {"fine": "much"}}]},
+            r"recipe\.phase\[0\]\.losses\.fine: expected a num",
+        ),
+        ({"phase": [{**PHASE, "epochs": 1.0}]}, "phase 'p': give steps or epochs"),
+        ({"phase": [{**PHASE, "decay": "step"}]}, "phase 'p': decay='step' needs decay_every above 0"),
+        ({"phase": [{**PHASE, "accumulate": 0}]}, "accumulate=0 must be at least 1"),
+        ({"phase": [{**PHASE, "data": {"moon": 1.0}}]}, r"data names \['moon'\]; the training sources are"),
+        ({"data": {"train": []}}, r"data\.train is empty: give at least one source"),
+        ({"data": {"train": [{"data": "a"}, {"data": "a"}]}}, "two sources of one name.*give each its own"),
+        ({"omp": False, "phase": [{**PHASE, "losses": {"mask": 2.0}}]}, "but the network has no OMP"),
+    ],
+)
+def test_a_mistake_names_its_key_and_what_would_do(
+    content: dict[str, Any], tmp_path: Path, changes: dict[str, Any], told: str
+) -> None:
+    file = write_recipe(tmp_path / "mine.toml", {**content, **changes})
+    with pytest.raises(ValueError, match=told) as raised:
+        recipe_file.read(file)
+    assert str(raised.value).startswith(str(file))
+
+
+def test_a_file_that_is_none(tmp_path: Path) -> None:
+    with pytest.raises(FileNotFoundError, match=r"no recipe of that name; known are .*paper, smoke"):
+        recipe_file.read("nothing")
+    (tmp_path / "x.toml").write_text("size =")
+    with pytest.raises(ValueError, match=r"x\.toml: not a TOML file"):
+        recipe_file.read(tmp_path / "x.toml")
+
+
+@pytest.mark.parametrize("name", recipes.names())
+def test_shipped_recipes_are_sound_and_name_no_folder(name: str) -> None:
+    recipe = recipe_file.read(name)
+    for source in (*recipe.data.train, *recipe.data.val):
+        assert re.fullmatch(r"sim:(train|val)/\w+(/\d+)?(#\d+)?|\w+:\{\w+\}#\w+", source.data)
+
+
+def test_the_paper_recipe_is_the_published_schedule() -> None:
+    (phase,) = recipe_file.read("paper").phase
+    assert (phase.optimizer, phase.rate, phase.epochs, phase.weight_decay) == ("adam", 1e-4, 20, 1e-6)
+    steps = steps_of(phase, 1000, 1)
+    assert steps == 20_000
+    # GeoTransformer's factor 0.95 every fourth epoch.
+    assert rate_at(phase, 3999, steps) == pytest.approx(1e-4)
+    assert rate_at(phase, 4000, steps) == pytest.approx(0.95e-4)
+    assert rate_at(phase, steps - 1, steps) == pytest.approx(1e-4 * 0.95**4)
+
+
+def test_rates_rise_then_fall() -> None:
+    phase = Phase(name="p", steps=10, rate=1.0, warmup=2, decay="linear")
+    rates = [rate_at(phase, step, 10) for step in range(10)]
+    assert rates[:3] == [0.5, 1.0, 1.0]
+    assert rates[3:] == sorted(rates[3:], reverse=True)
+    assert 0.0 < rates[-1] < 0.2
+
+
+def test_data_replaces_a_source_by_name_or_all_of_them(make_recipe: MakeRecipe) -> None:
+    recipe = make_recipe(
+        data={"train": [{"data": "a", "name": "near", "weight": 2.0}, {"data": "b", "name": "far"}]},
+        phase=[{**PHASE, "data": {"near": 1.0}}],
+    )
+    one = data_choice.with_data(recipe, ["near=elsewhere"])
+    assert [(s.data, s.title, s.weight) for s in one.data.train] == [
+        ("elsewhere", "near", 2.0),
+        ("b", "far", 1.0),
+    ]
+    assert one.phase == recipe.phase
+    every = data_choice.with_data(recipe, ["x", "y#val"])
+    assert [s.data for s in every.data.train] == ["x", "y#val"]
+    assert every.phase[0].data == {}
+
+
+def test_scaling_changes_the_length_alone(make_recipe: MakeRecipe) -> None:
+    recipe = make_recipe()
+    longer = recipe_file.scaled(recipe, 2.0)
+    assert [phase.steps for phase in longer.phase] == [2 * phase.steps for phase in recipe.phase]
+    assert dataclasses.replace(longer, phase=recipe.phase) == recipe
+    with pytest.raises(ValueError, match="steps-scale 0: must be above 0"):
+        recipe_file.scaled(recipe, 0)
+
+
+def test_data_that_must_be_given_is_asked_for_in_one_sentence(tmp_path: Path) -> None:
+    done = CliRunner().invoke(app, ["train", "paper", "--out", str(tmp_path / "run")])
+    assert done.exit_code == 2
+    assert done.stderr.count("\n") == 1
+    assert "--data cross3dreg=" in done.stderr
+    assert not (tmp_path / "run").exists()
+
+
+def test_a_folder_left_open_is_filled_everywhere(make_recipe: MakeRecipe) -> None:
+    filled = data_choice.with_data(recipe_file.read("paper"), ["cross3dreg=/data/c3d"])
+    assert [s.data for s in filled.data.train] == ["cross3dreg:/data/c3d#train"]
+    assert [(s.data, s.pairs) for s in filled.data.val] == [("cross3dreg:/data/c3d#val", 200)]
+    data_choice.require_data(filled)
+    both = make_recipe(data={"train": [{"data": "{a}", "name": "x"}, {"data": "b", "name": "y"}]})
+    other = data_choice.with_data(both, ["a=one", "y=two"])
+    assert [s.data for s in other.data.train] == ["one", "two"]
