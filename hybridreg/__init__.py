@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from hybridreg.classical.fpfh import Fpfh
     from hybridreg.classical.gicp import Gicp
     from hybridreg.classical.icp import Icp
+    from hybridreg.classical.candidates import Candidates
     from hybridreg.classical.kiss import KissMatcher
     from hybridreg.classical.kiss_icp import KissIcp
     from hybridreg.classical.nothing import GivenMatches, Identity, NoMatch, NoOverlap, NoRefinement
@@ -50,6 +51,7 @@ _WHERE = {
     "hybridreg.classical.fpfh": ["Fpfh"],
     "hybridreg.classical.gicp": ["Gicp"],
     "hybridreg.classical.icp": ["Icp"],
+    "hybridreg.classical.candidates": ["Candidates"],
     "hybridreg.classical.kiss": ["KissMatcher"],
     "hybridreg.classical.kiss_icp": ["KissIcp"],
     "hybridreg.classical.nothing": ["GivenMatches", "Identity", "NoMatch", "NoOverlap", "NoRefinement"],
