@@ -17,7 +17,7 @@ from hybridreg.scene import Scene
 from hybridreg.stage import Stage
 from hybridreg.verdict import rivals, views, weigh
 from hybridreg.verdict.agreement import compare
-from hybridreg.verdict.confidence import NEARLY
+from hybridreg.verdict.confidence import NEARLY, OK
 from hybridreg.verdict.rivals import Rival
 
 Array = NDArray[np.float64]
@@ -45,12 +45,12 @@ class Candidates(Stage):
     refine : stage of the refine slot
         For the best pose of an entry. The pose returned needs no other refinement.
     enough : float in [0, 1]
-        Confidence at which the search stops; 1 tries every entry.
+        Confidence at which the search stops (the verdict's "ok"); 1 tries every entry.
     """
 
     of: tuple[Entry, ...] = ({"estimate": "birdseye"}, {"estimate": "kiss"})
     refine: Any = "gicp"
-    enough: float = 0.95
+    enough: float = OK
 
     def __post_init__(self) -> None:
         if isinstance(self.refine, (str, Mapping)):
@@ -73,12 +73,14 @@ class Candidates(Stage):
                 found = self._joined(scene, found, pose)
                 if weigh(scene, _best_of(found)).confidence >= self.enough:
                     break
-        return _best_of(found) if found else Pose.unknown(len(matches))
+        if not found:
+            return Pose.unknown(len(matches))
+        return _best_of([found[0] if _promising(found[0]) else self._refined(scene, found[0]), *found[1:]])
 
     def _joined(self, scene: Scene, found: list[Rival], pose: Pose) -> list[Rival]:
         best, *others = rivals.best_first(scene, [pose.T, *pose.rivals[: _LOOKED_AT - 1]])
-        # What is far behind is no more than a rival, and refining it costs most, as nothing there lets it rest.
-        if not found or best.support > found[0].support - NEARLY:
+        # Refining a wrong pose costs most, as nothing there lets it rest.
+        if _promising(best) and (not found or best.support > found[0].support - NEARLY):
             best = self._refined(scene, best)
         return rivals.distinct(scene, [*found, best, *others])
 
@@ -86,6 +88,11 @@ class Candidates(Stage):
         T = self.refine(scene, Pose(settled.T)).T
         support = rivals.support(compare(*views.views(scene), T, views.spacing(scene)))
         return Rival(T, support) if support > settled.support - NEARLY else settled
+
+
+def _promising(settled: Rival) -> bool:
+    # More agrees than was looked through.
+    return settled.support > 0.0
 
 
 def _best_of(found: list[Rival]) -> Pose:

@@ -19,11 +19,11 @@ if (_root / "pyproject.toml").is_file() and (_root / "classical").is_dir():
 if TYPE_CHECKING:
     from hybridreg.api import register
     from hybridreg.classical.birdseye import BirdsEye
+    from hybridreg.classical.candidates import Candidates
     from hybridreg.classical.fgr import Fgr
     from hybridreg.classical.fpfh import Fpfh
     from hybridreg.classical.gicp import Gicp
     from hybridreg.classical.icp import Icp
-    from hybridreg.classical.candidates import Candidates
     from hybridreg.classical.kiss import KissMatcher
     from hybridreg.classical.kiss_icp import KissIcp
     from hybridreg.classical.nothing import GivenMatches, Identity, NoMatch, NoOverlap, NoRefinement
@@ -47,11 +47,11 @@ if TYPE_CHECKING:
 _WHERE = {
     "hybridreg.api": ["register"],
     "hybridreg.classical.birdseye": ["BirdsEye"],
+    "hybridreg.classical.candidates": ["Candidates"],
     "hybridreg.classical.fgr": ["Fgr"],
     "hybridreg.classical.fpfh": ["Fpfh"],
     "hybridreg.classical.gicp": ["Gicp"],
     "hybridreg.classical.icp": ["Icp"],
-    "hybridreg.classical.candidates": ["Candidates"],
     "hybridreg.classical.kiss": ["KissMatcher"],
     "hybridreg.classical.kiss_icp": ["KissIcp"],
     "hybridreg.classical.nothing": ["GivenMatches", "Identity", "NoMatch", "NoOverlap", "NoRefinement"],

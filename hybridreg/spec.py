@@ -3,8 +3,8 @@
 
 A table names a registered stage and its fields: `{stage = "match.fpfh", radius = 1.25}`. Reading one can only
 make objects of registered classes, so a file from a stranger cannot run code of its own. Inside a stage's table, a
-field that is called as a slot holds a stage of that slot, and a table of slots, `{match = "fpfh", estimate = "ransac"}`,
-one stage for each.
+field that is called as a slot holds a stage of that slot, and a table of slots one stage for each:
+`{match = "fpfh", estimate = "ransac"}`.
 """
 
 from __future__ import annotations
