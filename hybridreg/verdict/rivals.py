@@ -19,8 +19,8 @@ from hybridreg.verdict.views import View
 
 Array = NDArray[np.float64]
 
-# Rivals that the estimator offers, the best first; how many of all are looked at closely.
-_OFFERED, _CLOSELY = 4, 3
+# Rivals that the estimator offers, the best first; how many of all are settled, until so many are found.
+_OFFERED, _SETTLED, _CLOSELY = 4, 6, 3
 # Slides along the direction that is held least, in spacings: about 4 and 8 m outdoors, 1 and 2 m in a room.
 _SLIDES = (-16.0, -8.0, 8.0, 16.0)
 # Nearer than this (spacings, degrees) a rival is the pose itself.
@@ -83,12 +83,14 @@ def find(
     ]
     guesses = [guess for guess in guesses if differs(guess, T, information.centre, spacing)]
     promising = sorted(guesses, key=lambda G: -support(compare(source, target, G, spacing, every=_QUICK)))
-    settled = [settle(source, target, G, spacing) for G in promising[:_CLOSELY]]
-    found = [
-        Rival(G, support(compare(source, target, G, spacing, every=_CLOSE)))
-        for G in settled
-        if differs(G, T, information.centre, spacing)
-    ]
+    found: list[Rival] = []
+    for guess in promising[:_SETTLED]:
+        G = settle(source, target, guess, spacing)
+        # Guesses that come back to the pose are no rivals, and must not hide those behind them.
+        if differs(G, T, information.centre, spacing):
+            found.append(Rival(G, support(compare(source, target, G, spacing, every=_CLOSE))))
+        if len(found) == _CLOSELY:
+            break
     return sorted(found, key=lambda rival: -rival.support)
 
 
