@@ -26,6 +26,8 @@ Entry = Mapping[str, Any]
 _SLOTS = ("overlap", "match", "estimate")
 # Poses looked at of each entry: its own and the best of its rivals.
 _LOOKED_AT = 5
+# Poses refined in the end where none was promising: refinement reaches farther than settling.
+_LAST = 3
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -75,7 +77,10 @@ class Candidates(Stage):
                     break
         if not found:
             return Pose.unknown(len(matches))
-        return _best_of([found[0] if _promising(found[0]) else self._refined(scene, found[0]), *found[1:]])
+        if not _promising(found[0]):
+            last = [self._refined(scene, one) for one in found[:_LAST]]
+            found = rivals.distinct(scene, [*last, *found[_LAST:]])
+        return _best_of(found)
 
     def _joined(self, scene: Scene, found: list[Rival], pose: Pose) -> list[Rival]:
         best, *others = rivals.best_first(scene, [pose.T, *pose.rivals[: _LOOKED_AT - 1]])
@@ -91,8 +96,8 @@ class Candidates(Stage):
 
 
 def _promising(settled: Rival) -> bool:
-    # More agrees than was looked through.
-    return settled.support > 0.0
+    # Hardly more was looked through than agrees; nearly all settled poses that are far off have less support.
+    return settled.support > -NEARLY
 
 
 def _best_of(found: list[Rival]) -> Pose:
