@@ -26,8 +26,6 @@ Entry = Mapping[str, Any]
 _SLOTS = ("overlap", "match", "estimate")
 # Poses looked at of each entry: its own and the best of its rivals.
 _LOOKED_AT = 5
-# Poses refined in the end where none was promising: refinement reaches farther than settling.
-_LAST = 3
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -78,13 +76,12 @@ class Candidates(Stage):
         if not found:
             return Pose.unknown(len(matches))
         if not _promising(found[0]):
-            last = [self._refined(scene, one) for one in found[:_LAST]]
-            found = rivals.distinct(scene, [*last, *found[_LAST:]])
+            found[0] = self._refined(scene, found[0])
         return _best_of(found)
 
     def _joined(self, scene: Scene, found: list[Rival], pose: Pose) -> list[Rival]:
         best, *others = rivals.best_first(scene, [pose.T, *pose.rivals[: _LOOKED_AT - 1]])
-        # Refining a wrong pose costs most, as nothing there lets it rest.
+        # Refining a wrong pose costs most: nothing there lets it rest, and what is nearest is far away.
         if _promising(best) and (not found or best.support > found[0].support - NEARLY):
             best = self._refined(scene, best)
         return rivals.distinct(scene, [*found, best, *others])
