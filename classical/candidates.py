@@ -69,7 +69,7 @@ class Candidates(Stage):
         # A generator each, so that an entry's answer does not hang on those before it.
         for entry, own in zip(self.of, rng.spawn(len(self.of)), strict=True):
             pose = _pose(entry, scene, matches, own)
-            if pose.found:
+            if pose.found and np.isfinite(pose.T).all():
                 found = self._joined(scene, found, pose)
                 if weigh(scene, _best_of(found)).confidence >= self.enough:
                     break

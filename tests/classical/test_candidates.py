@@ -111,7 +111,15 @@ def test_poses_that_meet_are_one() -> None:
     assert run(offers("one", TRUTH, TRUTH), offers("two", TRUTH), enough=1.0).rivals.shape == (0, 4, 4)
 
 
-@pytest.mark.parametrize("failing", [{"estimate": Breaks()}, offers("nothing"), {"estimate": NeedsImage()}])
+@pytest.mark.parametrize(
+    "failing",
+    [
+        {"estimate": Breaks()},
+        offers("nothing"),
+        offers("nan", np.full((4, 4), np.nan)),
+        {"estimate": NeedsImage()},
+    ],
+)
 def test_an_entry_that_fails_does_not_stop_the_others(failing: dict[str, Any]) -> None:
     scene = sample_scene()[0]
     pair = hr.Pair(source=scene.pair.source, target=scene.pair.target)
