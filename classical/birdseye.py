@@ -11,26 +11,24 @@ from numpy.typing import NDArray
 
 from hybridreg import se3
 from hybridreg.classical import ground
-from hybridreg.classical.candidates import best_first
 from hybridreg.classical.climb import climb
 from hybridreg.classical.columns import FromAbove, from_above
-from hybridreg.classical.gicp import Gicp
 from hybridreg.classical.ground import Ground
 from hybridreg.classical.sweep import Planar, sweep
 from hybridreg.classical.voxel import VoxelGrid
 from hybridreg.matches import Correspondences, Pose
 from hybridreg.scene import Scene
 from hybridreg.stage import Stage
+from hybridreg.verdict.rivals import best_first
 
 Array = NDArray[np.float64]
 Side = Literal["source", "target"]
 
 # Outdoors; in a room, so many voxels along the distance within which all but a hundredth of the points lie.
 _VOXEL, _ALONG_REACH = 0.5, 60.0
-# In voxels: the coarse map's cell, the grid on which GICP refines the candidates, how far from the sensor points
-# are used.
-_COARSE, _ROUGH, _REACH = 3.0, 1.6, 200.0
-# Degrees between yaws; peaks for each pose that is refined, as some meet; the share of the best one's score they need.
+# In voxels: the coarse map's cell, how far from the sensor points are used.
+_COARSE, _REACH = 3.0, 200.0
+# Degrees between yaws; peaks for each pose that is settled, as some meet; the share of the best one's score they need.
 _YAW_STEP_DEG, _PEAKS, _SHARE = 4.0, 3, 0.75
 
 
@@ -41,8 +39,8 @@ class BirdsEye(Stage):
     Both clouds are levelled by their ground (`hybridreg.classical.ground`) and seen from above in layers of height.
     Columns with points count for a pose where they meet, columns that one sensor looked through and the other
     filled count a little against it. The correlation is computed by FFT for every yaw on a coarse grid, its best
-    peaks are improved on a fine one, and the best of these are refined by GICP and ranked by overlap. The height
-    follows from the two ground planes. The pose returned is the refined one; the others come back as `rivals`.
+    peaks are improved on a fine one, and the best of these are settled on the surfaces and ranked by the verdict's
+    support. The height follows from the two ground planes. The others come back as `rivals`.
 
     Where a cloud shows no ground, its sensor is taken to stand upright (or on its head, if the other one does) and
     its lowest points to be the ground; a note says so.
@@ -56,7 +54,7 @@ class BirdsEye(Stage):
     farthest : float
         Largest distance between the sensors along the ground, in voxels.
     tries : int
-        Poses refined by GICP, at most.
+        Poses settled and ranked, at most.
     """
 
     voxel: float | None = None
@@ -84,10 +82,7 @@ class BirdsEye(Stage):
             scene.note("bird's-eye search: nothing stands on the ground")
             return Pose.unknown()
         starts = [se3.inverse(frames[1]) @ M @ frames[0] for M in self._planar(views[0], views[1], voxel)]
-        rough = Gicp(
-            voxel=_ROUGH * voxel, max_distances=(6.0 * voxel, 3.0 * voxel), neighbours=10, iterations=20
-        )
-        ranked = best_first(own, starts, rough)
+        ranked = best_first(scene, starts)
         return Pose(ranked[0].T, rivals=np.array([one.T for one in ranked[1:]]).reshape(-1, 4, 4))
 
     def _view(self, own: Scene, side: Side, T_level_cloud: Array, voxel: float) -> FromAbove:

@@ -1,40 +1,133 @@
 # SPDX-License-Identifier: MIT
-"""Several poses, one scene: which of them lays most of the source on the target?"""
+"""Several recipes for one pose, the cheapest first, until one answer is beyond doubt."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from typing import NamedTuple
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from hybridreg.classical.gicp import Gicp
-from hybridreg.fitness import measure
-from hybridreg.matches import Pose
-from hybridreg.normals import tree
+from hybridreg import fitting, spec
+from hybridreg.classical.nothing import NoOverlap
+from hybridreg.matches import Correspondences, Pose
 from hybridreg.scene import Scene
+from hybridreg.stage import Stage
+from hybridreg.verdict import rivals, views, weigh
+from hybridreg.verdict.agreement import compare
+from hybridreg.verdict.confidence import NEARLY, OK
+from hybridreg.verdict.rivals import Rival
 
 Array = NDArray[np.float64]
+Entry = Mapping[str, Any]
+
+_SLOTS = ("overlap", "match", "estimate")
+# Poses looked at of each entry: its own and the best of its rivals.
+_LOOKED_AT = 5
 
 
-class Settled(NamedTuple):
-    """A pose `start` (4, 4), where it went when refined (`T`), and the share of the source that then lies on the
-    target."""
+@dataclass(frozen=True, kw_only=True)
+class Candidates(Stage):
+    """Try recipes in turn and return the pose that both clouds support best.
 
-    start: Array
-    T: Array
-    overlap: float
+    Every pose that an entry offers is settled and ranked by the verdict's own support (agreement of the surfaces that
+    both sensors looked at, less what they looked through), the best is refined and weighed with the others as its
+    rivals. Later entries are not run once the confidence is `enough`. What was not chosen comes back as `rivals`.
+
+    Parameters
+    ----------
+    of : tuple of mappings
+        Recipes: each holds an estimate stage, perhaps a match stage, and perhaps an overlap stage for that. An entry
+        without `match` gets the matches that this stage was given. One that raises ValueError, ImportError or OSError,
+        or lacks its image, is left out with a note.
+    refine : stage of the refine slot
+        For the best pose of an entry. The pose returned needs no other refinement.
+    enough : float in [0, 1]
+        Confidence at which the search stops (the verdict's "ok"); 1 tries every entry.
+    """
+
+    of: tuple[Entry, ...] = ({"estimate": "birdseye"}, {"estimate": "kiss"})
+    refine: Any = "gicp"
+    enough: float = OK
+
+    def __post_init__(self) -> None:
+        if isinstance(self.refine, (str, Mapping)):
+            object.__setattr__(self, "refine", spec.from_table(self.refine, "refine"))
+        if any(isinstance(stage, (str, Mapping)) for entry in self.of for stage in entry.values()):
+            object.__setattr__(self, "of", tuple(_built(entry) for entry in self.of))
+        if not self.of:
+            raise ValueError("of: no recipe at all; give one at least, such as {'estimate': 'birdseye'}")
+        for entry in self.of:
+            _check(entry)
+        if not 0.0 <= self.enough <= 1.0:
+            raise ValueError(f"enough={self.enough} must lie between 0 and 1")
+
+    def __call__(self, scene: Scene, matches: Correspondences, rng: np.random.Generator) -> Pose:
+        found: list[Rival] = []
+        # A generator each, so that an entry's answer does not hang on those before it.
+        for entry, own in zip(self.of, rng.spawn(len(self.of)), strict=True):
+            pose = _pose(entry, scene, matches, own)
+            if pose.found and np.isfinite(pose.T).all():
+                found = self._joined(scene, found, pose)
+                if weigh(scene, _best_of(found)).confidence >= self.enough:
+                    break
+        if not found:
+            return Pose.unknown(len(matches))
+        if not _promising(found[0]):
+            found[0] = self._refined(scene, found[0])
+        return _best_of(found)
+
+    def _joined(self, scene: Scene, found: list[Rival], pose: Pose) -> list[Rival]:
+        best, *others = rivals.best_first(scene, [pose.T, *pose.rivals[: _LOOKED_AT - 1]])
+        # Refining a wrong pose costs most: nothing there lets it rest, and what is nearest is far away.
+        if _promising(best) and (not found or best.support > found[0].support - NEARLY):
+            best = self._refined(scene, best)
+        return rivals.distinct(scene, [*found, best, *others])
+
+    def _refined(self, scene: Scene, settled: Rival) -> Rival:
+        T = self.refine(scene, Pose(settled.T)).T
+        support = rivals.support(compare(*views.views(scene), T, views.spacing(scene)))
+        return Rival(T, support) if support > settled.support - NEARLY else settled
 
 
-def best_first(scene: Scene, starts: Iterable[Array], refine: Gicp | None = None) -> list[Settled]:
-    """Refine each of `starts` (4, 4) by GICP and sort by overlap within 1.25 spacings; equals keep their order."""
-    refine = refine or Gicp()
-    settled = [_settle(scene, start, refine) for start in starts]
-    return sorted(settled, key=lambda one: -one.overlap)
+def _promising(settled: Rival) -> bool:
+    # Hardly more was looked through than agrees; nearly all settled poses that are far off have less support.
+    return settled.support > -NEARLY
 
 
-def _settle(scene: Scene, start: Array, refine: Gicp) -> Settled:
-    T = refine(scene, Pose(start)).T
-    overlap = measure(scene.source.points, tree(scene, "target"), T, 1.25 * scene.spacing).fitness
-    return Settled(start, T, overlap)
+def _best_of(found: list[Rival]) -> Pose:
+    return Pose(found[0].T, rivals=np.array([rival.T for rival in found[1:]]).reshape(-1, 4, 4))
+
+
+def _built(entry: Entry) -> Entry:
+    return {
+        slot: spec.from_table(stage, slot) if isinstance(stage, (str, Mapping)) else stage
+        for slot, stage in entry.items()
+    }
+
+
+def _check(entry: Entry) -> None:
+    unknown = set(entry) - set(_SLOTS)
+    if unknown or "estimate" not in entry or ("overlap" in entry and "match" not in entry):
+        raise ValueError(
+            f"of: an entry holds {', '.join(entry) or 'nothing'}; it needs `estimate`, and may have `match` and, "
+            "with that, `overlap`"
+        )
+    if "match" in entry:
+        fitting.check_match(entry["match"], entry["estimate"])
+
+
+def _pose(entry: Entry, scene: Scene, matches: Correspondences, rng: np.random.Generator) -> Pose:
+    try:
+        for stage in entry.values():
+            fitting.check_stage_image(stage, scene.pair)
+        if "match" in entry:
+            matches = entry["match"](scene, entry.get("overlap", NoOverlap())(scene))
+        return entry["estimate"](scene, matches, rng)
+    except (ValueError, ImportError, OSError) as error:
+        scene.note(
+            f"a candidate ({' + '.join(type(s).__name__ for s in entry.values())}) was left out: {error}"
+        )
+        return Pose.unknown()

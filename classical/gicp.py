@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -19,6 +20,9 @@ from hybridreg.stage import Stage
 
 Array = NDArray[np.float64]
 Side = Literal["source", "target"]
+
+# Steps at which a round ends, and how many times larger they may be in the rounds before the last.
+_STILL_RAD, _STILL_M, _COARSE = 1e-5, 1e-4, 100.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -49,7 +53,10 @@ class Gicp(Stage):
         source, _ = _prepared(scene, "source", voxel, self.neighbours)
         target, target_tree = _prepared(scene, "target", voxel, self.neighbours)
         T = pose.T
-        for distance in self.max_distances or (5 * scene.spacing, 2.5 * scene.spacing, 1.25 * scene.spacing):
+        distances = self.max_distances or (5 * scene.spacing, 2.5 * scene.spacing, 1.25 * scene.spacing)
+        for distance in distances:
+            # Only the last round needs to rest.
+            still = 1.0 if distance == distances[-1] else _COARSE
             # One thread: with more, the order of summation and so the last digits depend on the machine.
             T = small_gicp.align(
                 target,
@@ -58,8 +65,8 @@ class Gicp(Stage):
                 init_T_target_source=T,
                 max_correspondence_distance=distance,
                 max_iterations=self.iterations,
-                rotation_epsilon=1e-5,
-                translation_epsilon=1e-4,
+                rotation_epsilon=still * _STILL_RAD,
+                translation_epsilon=still * _STILL_M,
                 num_threads=1,
             ).T_target_source
         return not_worse(scene, pose, np.asarray(T))
@@ -86,10 +93,15 @@ def _prepared(scene: Scene, side: Side, voxel: float, neighbours: int) -> tuple[
     )
 
 
+def _threads() -> int:
+    # Each point's covariance is its own sum, so here the number of threads changes nothing.
+    return n_threads() if n_threads() > 0 else os.cpu_count() or 1
+
+
 def _prepare(points: Array, voxel: float, neighbours: int) -> tuple[Any, Any]:
     import small_gicp
 
     cloud = small_gicp.PointCloud(voxel_centroids(points, voxel))
     kd_tree = small_gicp.KdTree(cloud)
-    small_gicp.estimate_covariances(cloud, kd_tree, min(neighbours, cloud.size()), max(1, n_threads()))
+    small_gicp.estimate_covariances(cloud, kd_tree, min(neighbours, cloud.size()), _threads())
     return cloud, kd_tree

@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from hybridreg.classical.candidates import best_first
 from hybridreg.classical.voxel import voxel_centroids
 from hybridreg.matches import Correspondences, Pose
 from hybridreg.resources import n_threads
@@ -27,30 +26,38 @@ _LARGEST_NOISE = 0.999
 
 @dataclass(frozen=True, kw_only=True)
 class KissMatcher(Stage):
-    """Register the whole clouds at several voxel sizes and keep the pose that lays most of the source on the target.
+    """Register the whole clouds at one voxel size.
 
-    Its own count of inliers does not tell right from wrong on clouds of different sensors, so each pose is refined
-    by GICP and judged by overlap; the pose returned is the unrefined one. The others come back as `rivals`.
+    Which size is right hangs on the pair, and its own count of inliers does not tell on clouds of different sensors:
+    let `Candidates` try several.
 
     Parameters
     ----------
-    voxels : tuple of float or None
-        Metres; None takes 0.75, 1.25 and 2.5 spacings of the levels.
+    voxel : float or None
+        Metres; None takes `scale`.
+    scale : float
+        Voxel in spacings of the levels.
     max_matches : int
         KISS-Matcher keeps at most so many initial matches.
     """
 
-    voxels: tuple[float, ...] | None = None
+    voxel: float | None = None
+    scale: float = 1.25
     max_matches: int = 5000
 
+    def __post_init__(self) -> None:
+        for name in ("voxel", "scale"):
+            value = getattr(self, name)
+            if value is not None and not 0.0 < value < np.inf:
+                raise ValueError(f"{name}={value} must be a positive number")
+
     def __call__(self, scene: Scene, matches: Correspondences, rng: np.random.Generator) -> Pose:
-        voxels = self.voxels or tuple(k * scene.spacing for k in (0.75, 1.25, 2.5))
-        found = [T for voxel in voxels if (T := self._at(scene, voxel)) is not None]
-        if not found:
-            scene.note("KISS-Matcher found no pose at any voxel size")
+        voxel = self.voxel or self.scale * scene.spacing
+        T = self._at(scene, voxel)
+        if T is None:
+            scene.note(f"KISS-Matcher found no pose at a voxel of {voxel:.3g} m")
             return Pose.unknown()
-        ranked = [one.start for one in best_first(scene, found)] if len(found) > 1 else found
-        return Pose(ranked[0], rivals=np.array(ranked[1:]).reshape(-1, 4, 4))
+        return Pose(T)
 
     def _at(self, scene: Scene, voxel: float) -> Array | None:
         try:

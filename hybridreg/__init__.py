@@ -19,6 +19,7 @@ if (_root / "pyproject.toml").is_file() and (_root / "classical").is_dir():
 if TYPE_CHECKING:
     from hybridreg.api import register
     from hybridreg.classical.birdseye import BirdsEye
+    from hybridreg.classical.candidates import Candidates
     from hybridreg.classical.fgr import Fgr
     from hybridreg.classical.fpfh import Fpfh
     from hybridreg.classical.gicp import Gicp
@@ -47,6 +48,7 @@ if TYPE_CHECKING:
 _WHERE = {
     "hybridreg.api": ["register"],
     "hybridreg.classical.birdseye": ["BirdsEye"],
+    "hybridreg.classical.candidates": ["Candidates"],
     "hybridreg.classical.fgr": ["Fgr"],
     "hybridreg.classical.fpfh": ["Fpfh"],
     "hybridreg.classical.gicp": ["Gicp"],

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any, Literal
 
 import numpy as np
@@ -72,7 +73,7 @@ class PointCloud:
     def __len__(self) -> int:
         return len(self.points)
 
-    @property
+    @cached_property
     def viewpoint(self) -> Array | None:
         """Where the sensor stood, (3,): the origin of its frame, or None where that lies far from the points."""
         low, high = self.points.min(axis=0), self.points.max(axis=0)

@@ -51,27 +51,33 @@ def check(pipeline: Pipeline) -> None:
     for slot in SLOTS:
         if not callable(getattr(pipeline, slot)):
             raise ValueError(f"{slot}: {getattr(pipeline, slot)!r} is no stage; it must be callable")
-    given = _words(pipeline.match, "gives")
-    lacking = _words(pipeline.estimate, "needs") - given - {"image"}
+    check_match(pipeline.match, pipeline.estimate)
+
+
+def check_match(match: Any, estimate: Any) -> None:
+    """Refuse an estimator that needs what the matcher does not give."""
+    given = _words(match, "gives")
+    lacking = _words(estimate, "needs") - given - {"image"}
     if not lacking:
         return
     word = sorted(lacking)[0]
     raise ValueError(
-        f"{_label(pipeline.estimate)} needs {word!r} from the match stage, and {_label(pipeline.match)} does not give "
+        f"{_label(estimate)} needs {word!r} from the match stage, and {_label(match)} does not give "
         f"it. Matchers that do: {_or(registry.slot_fits('match', gives=word))}. Estimators that work with "
-        f"{_label(pipeline.match)}: {_or(registry.slot_fits('estimate', needs=given))}"
+        f"{_label(match)}: {_or(registry.slot_fits('estimate', needs=given))}"
     )
 
 
 def check_image(pipeline: Pipeline, pair: Pair) -> None:
     """Refuse a pair without an image where a stage cannot do without."""
-    if pair.image is not None:
-        return
     for slot in SLOTS:
-        if "image" in _words(getattr(pipeline, slot), "needs"):
-            raise ValueError(
-                f"pair {pair.id}: {_label(getattr(pipeline, slot))} needs an image; pass image=..."
-            )
+        check_stage_image(getattr(pipeline, slot), pair)
+
+
+def check_stage_image(stage: Any, pair: Pair) -> None:
+    """Refuse a pair without an image where this stage cannot do without."""
+    if pair.image is None and "image" in _words(stage, "needs"):
+        raise ValueError(f"pair {pair.id}: {_label(stage)} needs an image; pass image=...")
 
 
 def check_scene(scene: Scene) -> None:

@@ -42,8 +42,9 @@ def estimate(points: Array, viewpoint: Array | None, k: int = 20) -> Surface:
     """Normals (n, 3) of `points` (n, 3): the direction of least spread among the k nearest neighbours."""
     k = min(k, len(points))
     _, index = cKDTree(points).query(points, k=k, workers=n_threads())
-    neighbours = points[index.reshape(len(points), k)]
-    centred = neighbours - neighbours.mean(axis=1, keepdims=True)
+    neighbours = points.take(index.reshape(len(points), k), axis=0)
+    # einsum sums over the middle axis several times faster than mean.
+    centred = neighbours - np.einsum("nki->ni", neighbours)[:, None] / k
     values, vectors = np.linalg.eigh(np.swapaxes(centred, 1, 2) @ centred / k)
     normals = vectors[:, :, 0]
     towards = np.array([0.0, 0.0, 1.0]) if viewpoint is None else viewpoint - points

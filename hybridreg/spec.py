@@ -2,7 +2,9 @@
 """Stages as plain tables, for TOML files and stored results.
 
 A table names a registered stage and its fields: `{stage = "match.fpfh", radius = 1.25}`. Reading one can only
-make objects of registered classes, so a file from a stranger cannot run code of its own.
+make objects of registered classes, so a file from a stranger cannot run code of its own. Inside a stage's table, a
+field that is called as a slot holds a stage of that slot, and a table of slots one stage for each:
+`{match = "fpfh", estimate = "ransac"}`.
 """
 
 from __future__ import annotations
@@ -14,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from hybridreg import registry
+from hybridreg.slots import SLOTS
 from hybridreg.stage import own_params
 
 
@@ -26,14 +29,18 @@ def to_table(stage: Any, slot: str | None = None) -> dict[str, Any]:
         name = registered.removeprefix(f"{slot}.") if slot else registered
     fields = own_params(stage) if dataclasses.is_dataclass(stage) else {}
     # TOML has no null; a field left out takes its default, which is None wherever a field may be None.
-    return {"stage": name, **{key: _plain(value) for key, value in fields.items() if value is not None}}
+    return {"stage": name, **{key: _plain(value, key) for key, value in fields.items() if value is not None}}
 
 
-def _plain(value: Any) -> Any:
+def _plain(value: Any, key: str) -> Any:
+    if key in SLOTS and callable(value):
+        return to_table(value, key)
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
         return to_table(value)
+    if isinstance(value, Mapping):
+        return {slot: _plain(stage, slot) for slot, stage in value.items()}
     if isinstance(value, (tuple, list, np.ndarray)):
-        return [_plain(item) for item in value]
+        return [_plain(item, "") for item in value]
     if isinstance(value, np.generic):
         return value.item()
     if isinstance(value, (str, int, float, bool)):
@@ -57,7 +64,7 @@ def from_table(table: Any, slot: str | None = None) -> Any:
         raise ValueError(f"expected a stage's name or a table with a `stage`, got {table!r}")
     own_slot, name = _resolve(table["stage"], slot)
     cls = registry.load(own_slot, name)
-    fields = {key: _restore(value) for key, value in table.items() if key != "stage"}
+    fields = {key: _restore(value, key) for key, value in table.items() if key != "stage"}
     try:
         return cls(**fields)
     except TypeError as error:
@@ -77,9 +84,11 @@ def _resolve(name: str, slot: str | None) -> tuple[str, str]:
     return own_slot, short
 
 
-def _restore(value: Any) -> Any:
+def _restore(value: Any, key: str) -> Any:
     if isinstance(value, Mapping):
-        return from_table(value)
+        if value and set(value) <= set(SLOTS):
+            return {slot: _restore(stage, slot) for slot, stage in value.items()}
+        return from_table(value, key if key in SLOTS else None)
     if isinstance(value, list):
-        return tuple(_restore(item) for item in value)
+        return tuple(_restore(item, "") for item in value)
     return value

@@ -13,7 +13,7 @@ def test_a_preset_and_what_differs() -> None:
     pipe = changes.build({"preset": "icp", "voxel": 0.3, "refine": {"iterations": 7}, "match": "none"})
     assert isinstance(pipe.refine, hr.Icp)
     assert (pipe.refine.iterations, pipe.downsample.voxel) == (7, 0.3)
-    assert changes.build({}).to_spec() == hr.Pipeline.preset("kiss-gicp").to_spec()
+    assert changes.build({}).to_spec() == hr.Pipeline.preset("default").to_spec()
 
 
 def test_another_stage_drops_the_fields_of_the_old_one() -> None:
@@ -35,8 +35,8 @@ def test_a_file_is_a_start_too(tmp_path: Path) -> None:
         (["match=fpfh", "match.radius=2"], {"match": {"stage": "fpfh", "radius": 2}}),
         (["match.radius=2", "match=none"], {"match": "none"}),
         (["voxel=0.3", " refine = gicp "], {"voxel": 0.3, "refine": "gicp"}),
-        (["refine.kind=plane", "estimate.voxels=[0.3, 0.5]"],
-         {"refine": {"kind": "plane"}, "estimate": {"voxels": [0.3, 0.5]}}),
+        (["refine.kind=plane", "estimate.layers=[0.3, 0.5]"],
+         {"refine": {"kind": "plane"}, "estimate": {"layers": [0.3, 0.5]}}),
     ],
 )  # fmt: skip
 def test_settings_are_read(texts: list[str], expected: dict[str, object]) -> None:

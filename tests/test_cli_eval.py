@@ -176,7 +176,7 @@ def test_list_names_everything() -> None:
     text = call("list").stdout
     for part in (
         "refine: gicp, icp, kiss-icp, none",
-        "kiss-gicp (default)",
+        "default (default)",
         "folder:...",
         "classical",
         "cross3dreg",

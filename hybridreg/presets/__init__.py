@@ -16,7 +16,7 @@ if sys.version_info >= (3, 11):
 else:
     import tomli as tomllib
 
-DEFAULT = "kiss-gicp"
+DEFAULT = "default"
 
 
 def names() -> list[str]:

@@ -28,6 +28,28 @@ _NO_RIVAL = -1.0
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
+class Weighed:
+    """What both clouds say about a pose.
+
+    Attributes
+    ----------
+    agreement : Agreement
+    held : Information
+    rivals : list of Rival
+        Settled, the best supported first.
+    evidence : dict of str to float
+        Always the same keys, see `evidence_of`.
+    confidence : float in (0, 1)
+    """
+
+    agreement: Agreement
+    held: Information
+    rivals: list[Rival]
+    evidence: dict[str, float]
+    confidence: float
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Judgement:
     """Whether to believe a pose, and why.
 
@@ -67,26 +89,46 @@ def judge(scene: Scene, pose: Pose, matches: Correspondences) -> Judgement:
     The evidence is taken at a resolution of its own (`hybridreg.resolution.default_voxel`), so that it means the
     same whatever voxel the pipeline used. A pose that was not found is judged as what it is, a placeholder: failed.
     """
+    weighed = weigh(scene, pose)
+    distance = 2.0 * (matches.spacing or scene.spacing)
+    evidence = {**weighed.evidence, "matches_agreeing": _agreeing(matches, pose.T, distance)}
+    probability = weighed.confidence if pose.found else 0.0
+    max_distance = 2.0 * scene.spacing
+    fitness, fitness_target = _fitness(scene, pose.T, max_distance)
+    return Judgement(
+        verdict=word(probability),
+        confidence=probability,
+        reasons=reasons(
+            evidence, weighed.agreement, weighed.held, found=pose.found, images=_images(*views.views(scene))
+        ),
+        evidence=evidence,
+        fitness=fitness,
+        fitness_target=fitness_target,
+        max_distance=max_distance,
+        information=weighed.held.matrix,
+        rivals=_close(weighed.rivals, weighed.evidence["support"]),
+    )
+
+
+def weigh(scene: Scene, pose: Pose) -> Weighed:
+    """Evidence and confidence of a pose and its rivals, without what only the result needs.
+
+    Computed once for a pose: an estimator that weighed its answer spares the verdict the work.
+    """
+    # Rounded, as the pipeline makes the rotation of a pose exact to the last digit.
+    key = tuple(np.round([pose.T, *pose.rivals], 9).ravel())
+    return scene.shared(("weighed", pose.found, key), lambda: _weigh(scene, pose))
+
+
+def _weigh(scene: Scene, pose: Pose) -> Weighed:
     source, target = views.views(scene)
     spacing = views.spacing(scene)
     agreement = compare(source, target, pose.T, spacing)
     held = information.measure(agreement, target)
     found = rivals.find(source, target, pose.T, agreement, held, pose.rivals, spacing) if pose.found else []
     evidence = evidence_of(agreement, held, found, target)
-    evidence["matches_agreeing"] = _agreeing(matches, pose.T, 2.0 * (matches.spacing or scene.spacing))
-    probability = confidence(evidence) if pose.found else 0.0
-    max_distance = 2.0 * scene.spacing
-    fitness, fitness_target = _fitness(scene, pose.T, max_distance)
-    return Judgement(
-        verdict=word(probability),
-        confidence=probability,
-        reasons=reasons(evidence, agreement, held, found=pose.found, images=_images(source, target)),
-        evidence=evidence,
-        fitness=fitness,
-        fitness_target=fitness_target,
-        max_distance=max_distance,
-        information=held.matrix,
-        rivals=_close(found, rivals.support(agreement)),
+    return Weighed(
+        agreement=agreement, held=held, rivals=found, evidence=evidence, confidence=confidence(evidence)
     )
 
 

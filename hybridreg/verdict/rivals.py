@@ -1,22 +1,26 @@
 # SPDX-License-Identifier: MIT
-"""Other poses that might explain the data: half a turn, a slide along the street, and what the estimator offers."""
+"""Poses that might explain the data: what an estimator offers, half a turn, a slide along the street."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hybridreg import se3
+from hybridreg.scene import Scene
+from hybridreg.verdict import views
 from hybridreg.verdict.agreement import Agreement, compare
 from hybridreg.verdict.information import Information
+from hybridreg.verdict.settle import settle
 from hybridreg.verdict.views import View
 
 Array = NDArray[np.float64]
 
-# Rivals that the estimator offers, the best first; how many of all are looked at closely.
-_OFFERED, _CLOSELY = 4, 3
+# Rivals that the estimator offers, the best first; how many of all are settled, until so many are found.
+_OFFERED, _SETTLED, _CLOSELY = 4, 6, 3
 # Slides along the direction that is held least, in spacings: about 4 and 8 m outdoors, 1 and 2 m in a room.
 _SLIDES = (-16.0, -8.0, 8.0, 16.0)
 # Nearer than this (spacings, degrees) a rival is the pose itself.
@@ -37,6 +41,25 @@ def support(agreement: Agreement) -> float:
     return float(agreement.shares.min() - agreement.looked_through)
 
 
+def best_first(scene: Scene, starts: Iterable[Array]) -> list[Rival]:
+    """Each of `starts` (4, 4) where it fits best, the best supported first; of those that meet, one."""
+    source, target = views.views(scene)
+    spacing = views.spacing(scene)
+    settled = [settle(source, target, start, spacing) for start in starts]
+    return distinct(scene, [Rival(T, support(compare(source, target, T, spacing))) for T in settled])
+
+
+def distinct(scene: Scene, found: Iterable[Rival]) -> list[Rival]:
+    """The best supported first, without those that hardly differ from a better one."""
+    middle, spacing = views.views(scene)[0].points.mean(axis=0, keepdims=True), views.spacing(scene)
+    kept: list[Rival] = []
+    for one in sorted(found, key=lambda rival: -rival.support):
+        centre = se3.apply(one.T, middle)[0]
+        if all(differs(other.T, one.T, centre, spacing) for other in kept):
+            kept.append(one)
+    return kept
+
+
 def find(
     source: View,
     target: View,
@@ -53,21 +76,21 @@ def find(
     offered : (r, 4, 4)
         Rivals that the estimator knows of.
     """
-    from hybridreg.verdict.settle import settle
-
     guesses = [
         *offered[:_OFFERED],
         *_turned(source, target, T, agreement, information),
         *_slid(T, agreement, spacing),
     ]
-    guesses = [guess for guess in guesses if _differs(guess, T, information.centre, spacing)]
+    guesses = [guess for guess in guesses if differs(guess, T, information.centre, spacing)]
     promising = sorted(guesses, key=lambda G: -support(compare(source, target, G, spacing, every=_QUICK)))
-    settled = [settle(source, target, G, spacing) for G in promising[:_CLOSELY]]
-    found = [
-        Rival(G, support(compare(source, target, G, spacing, every=_CLOSE)))
-        for G in settled
-        if _differs(G, T, information.centre, spacing)
-    ]
+    found: list[Rival] = []
+    for guess in promising[:_SETTLED]:
+        G = settle(source, target, guess, spacing)
+        # Guesses that come back to the pose are no rivals, and must not hide those behind them.
+        if differs(G, T, information.centre, spacing):
+            found.append(Rival(G, support(compare(source, target, G, spacing, every=_CLOSE))))
+        if len(found) == _CLOSELY:
+            break
     return sorted(found, key=lambda rival: -rival.support)
 
 
@@ -97,7 +120,8 @@ def _slid(T: Array, agreement: Agreement, spacing: float) -> list[Array]:
     return [se3.from_rt(np.eye(3), length * spacing * agreement.axes[2]) @ T for length in _SLIDES]
 
 
-def _differs(rival: Array, T: Array, centre: Array, spacing: float) -> bool:
+def differs(rival: Array, T: Array, centre: Array, spacing: float) -> bool:
+    """Whether two poses (4, 4) are two answers, seen at `centre` (3,) of the target's frame."""
     step = rival @ se3.inverse(T)
     moved = float(np.linalg.norm(se3.apply(step, centre[None])[0] - centre))
     return moved > _APART * spacing or se3.angle_deg(step[:3, :3]) > _TURNED

@@ -17,7 +17,7 @@ pytest.importorskip("kiss_matcher")
 ROOT = Path(__file__).resolve().parents[2]
 
 
-def run(scene: Scene, **fields: tuple[float, ...]) -> hr.Pose:
+def run(scene: Scene, **fields: float) -> hr.Pose:
     return hr.KissMatcher(**fields)(scene, Correspondences.none(), np.random.default_rng(0))
 
 
@@ -40,9 +40,16 @@ def test_repeats_to_the_last_bit(courtyard_scene: tuple[Scene, np.ndarray]) -> N
         assert np.array_equal(first.rivals, again.rivals)
 
 
-def test_each_voxel_size_that_answers_is_kept_as_a_rival(courtyard_scene: tuple[Scene, np.ndarray]) -> None:
-    pose = run(courtyard_scene[0], voxels=(0.3, 0.5))
-    assert pose.rivals.shape == (1, 4, 4)
+def test_a_scale_is_a_voxel_in_spacings(courtyard_scene: tuple[Scene, np.ndarray]) -> None:
+    scene = courtyard_scene[0]
+    assert np.array_equal(run(scene, scale=2.0).T, run(scene, voxel=2.0 * scene.spacing).T)
+    assert not np.array_equal(run(scene, scale=2.0).T, run(scene).T)
+
+
+@pytest.mark.parametrize("fields", [{"voxel": 0.0}, {"scale": -1.0}, {"scale": float("inf")}])
+def test_a_size_that_makes_no_sense_is_refused(fields: dict[str, float]) -> None:
+    with pytest.raises(ValueError, match="must be a positive number"):
+        hr.KissMatcher(**fields)
 
 
 HOSTILE = """

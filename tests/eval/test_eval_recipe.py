@@ -111,7 +111,15 @@ def test_the_shipped_table_holds_every_classical_preset() -> None:
     pytest.importorskip("hybridreg.classical.fpfh")
     assert "classical" in recipe.known()
     read = recipe.read("classical")
-    names = {"icp", "fpfh-ransac", "fpfh-ransac-gicp", "fpfh-fgr-gicp", "kiss-gicp"}
+    names = {
+        "icp",
+        "fpfh-ransac",
+        "fpfh-ransac-gicp",
+        "fpfh-fgr-gicp",
+        "kiss-gicp",
+        "birdseye-gicp",
+        "default",
+    }
     assert {line.name for line in read.lines} == names
     assert read.starts == 3
 
