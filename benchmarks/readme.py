@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: MIT
-"""Put measured tables into README.md, between their markers, so that no figure there is typed by hand.
+"""Put measured tables into a page, between their markers, so that no figure there is typed by hand.
 
     python -m benchmarks.readme real=runs/real/table.md peers=runs/peers.md
 
-replaces what stands between `<!-- real -->` and `<!-- /real -->` by that file, and so on.
+replaces what stands in README.md between `<!-- real -->` and `<!-- /real -->` by that file, and so on; of a file that
+`hybridreg table` wrote, by its first protocol's caption, results and verdicts. `--page docs/simulator.md` names
+another page.
 """
 
 from __future__ import annotations
@@ -14,7 +16,8 @@ from pathlib import Path
 
 from hybridreg.io import write_text
 
-README = Path(__file__).resolve().parent.parent / "README.md"
+ROOT = Path(__file__).resolve().parent.parent
+_SHOWN = ("Results", "Verdict against success")
 
 
 def insert(page: str, name: str, text: str) -> str:
@@ -31,16 +34,29 @@ def insert(page: str, name: str, text: str) -> str:
     return pattern.sub(lambda found: f"{found[1]}\n{text.strip()}\n\n{found[2]}", page)
 
 
+def shown(text: str) -> str:
+    """Caption, results and verdicts of a table's first protocol; any other text as it is."""
+    protocols = re.split(r"^## .*$", text, flags=re.MULTILINE)
+    if len(protocols) < 2:
+        return text
+    caption, *sections = re.split(r"^### (.*)$", protocols[1], flags=re.MULTILINE)
+    bodies = dict(zip(sections[::2], sections[1::2], strict=True))
+    return "\n\n".join([caption.strip(), *(bodies[name].strip() for name in _SHOWN if name in bodies)])
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("parts", nargs="+", metavar="name=file")
-    page = README.read_text(encoding="utf-8")
-    for part in parser.parse_args().parts:
-        name, _, file = part.partition("=")
-        page = insert(page, name, Path(file).read_text(encoding="utf-8"))
-    write_text(README, page)
+    parser.add_argument("--page", default="README.md")
+    given = parser.parse_args()
+    file = ROOT / given.page
+    page = file.read_text(encoding="utf-8")
+    for part in given.parts:
+        name, _, table = part.partition("=")
+        page = insert(page, name, shown(Path(table).read_text(encoding="utf-8")))
+    write_text(file, page)
 
 
 if __name__ == "__main__":

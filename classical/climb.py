@@ -62,7 +62,7 @@ def _distinct(found: Planar, apart: float) -> Planar:
         near = (np.abs(turn) < np.radians(_SAME_DEG)) & (np.abs(found.shift[kept] - found.shift[one]) < apart)
         if not near.any():
             kept.append(one)
-    return Planar(*(column[kept] for column in found))
+    return Planar(found.yaw[kept], found.shift[kept], found.score[kept])
 
 
 def _scores(

@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from hybridreg.classical.visibility import Visibility
     from hybridreg.classical.voxel import VoxelGrid
     from hybridreg.cloud import PointCloud
+    from hybridreg.learned.stages.dense import DenseFeatures
     from hybridreg.learned.stages.geotransformer import GeoTransformer
     from hybridreg.learned.stages.lgr import Lgr
     from hybridreg.learned.stages.omp import Omp
@@ -59,6 +60,7 @@ _WHERE = {
     "hybridreg.classical.visibility": ["Visibility"],
     "hybridreg.classical.voxel": ["VoxelGrid"],
     "hybridreg.cloud": ["PointCloud"],
+    "hybridreg.learned.stages.dense": ["DenseFeatures"],
     "hybridreg.learned.stages.geotransformer": ["GeoTransformer"],
     "hybridreg.learned.stages.lgr": ["Lgr"],
     "hybridreg.learned.stages.omp": ["Omp"],

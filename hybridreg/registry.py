@@ -25,6 +25,7 @@ BUILT_IN = {
     "match.fpfh": "hybridreg.classical.fpfh:Fpfh",
     "match.vgam": "hybridreg.learned.stages.vgam:Vgam",
     "match.geotransformer": "hybridreg.learned.stages.geotransformer:GeoTransformer",
+    "match.dense": "hybridreg.learned.stages.dense:DenseFeatures",
     "estimate.identity": "hybridreg.classical.nothing:Identity",
     "estimate.ransac": "hybridreg.classical.ransac:Ransac",
     "estimate.svd": "hybridreg.classical.svd:WeightedSvd",

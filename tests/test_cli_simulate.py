@@ -26,7 +26,7 @@ def drawn(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     numbers: list[int] = []
     points = np.random.default_rng(0).integers(-2000, 2000, (900, 3)).astype(np.float32) / 256
     blank = encode(np.full((288, 512, 3), 90, np.uint8), 80)
-    plain = Drawn(points, points, blank, np.eye(4), 1.0, "street", "mems-fan", "hdl64e")
+    plain = Drawn(points, points, blank, np.eye(4), 1.0, "street", "mems-fan", "hdl64e", 2)
 
     def draw(_: str, number: int) -> Drawn:
         numbers.append(number)

@@ -8,7 +8,7 @@ from functools import lru_cache
 
 from hybridreg.data.dataset import Dataset
 from hybridreg.data.simulate.labelled import pair, pair_id
-from hybridreg.data.simulate.splits import VERSION, pair_number
+from hybridreg.data.simulate.splits import pair_number
 from hybridreg.data.simulate.tiers import tier_named
 from hybridreg.pair import LabelledPair
 
@@ -38,7 +38,7 @@ class Simulated(Dataset):
         self.seed, self.pairs = int(found["seed"] or 0), int(found["pairs"] or PAIRS)
         if found["pairs"] and self.pairs == 0:
             raise ValueError(f"sim:{text}: a data set of 0 pairs; ask for one at least")
-        tier_named(self.tier)
+        self.version = tier_named(self.tier).version
         pair_number(self.split, self.seed, self.pairs - 1)
 
     @property
@@ -49,12 +49,12 @@ class Simulated(Dataset):
         return _drawn(self.split, self.tier, self.seed, index)
 
     def fingerprint(self) -> str:
-        """Changes with the simulator's version too, as the same names then stand for other pairs."""
-        return f"sim{VERSION}-{super().fingerprint()}"
+        """Changes with the version of the tier's pairs too, as the same names then stand for other pairs."""
+        return f"sim{self.version}-{super().fingerprint()}"
 
     def pair_fingerprint(self, index: int) -> str:
-        """The pair's name and the simulator's version, however many pairs are asked for."""
-        return f"sim{VERSION}-{pair_id(self.split, self.tier, self.seed, index)}"
+        """The pair's name and the version of the tier's pairs, however many pairs are asked for."""
+        return f"sim{self.version}-{pair_id(self.split, self.tier, self.seed, index)}"
 
 
 # Yaw starts ask for the same pair several times in a row.

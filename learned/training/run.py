@@ -66,11 +66,7 @@ def train(recipe: Recipe, options: RunOptions) -> Path | None:
     fabric = start_processes(options.devices, options.accelerator, recipe.precision)
     options.out.mkdir(parents=True, exist_ok=True)
     quiet = not fabric.is_global_zero
-    with (
-        Reporter(options.out, quiet=quiet) as reporter,
-        stop_on_signals() as stop,
-        torch.random.fork_rng(devices=[]),
-    ):
+    with Reporter(options.out, quiet=quiet) as reporter, torch.random.fork_rng(devices=[]):
         training = _sources(recipe, recipe.data.train, options, fabric, reporter)
         val = _sources(recipe, recipe.data.val, options, fabric, reporter)
         network = first_network(recipe)
@@ -87,9 +83,11 @@ def train(recipe: Recipe, options: RunOptions) -> Path | None:
             log_every=recipe.log_every,
             total=partial(_total, fabric) if fabric.world_size > 1 else None,
         )
-        loop = Loop(fabric, recipe, network, training, options.out, record, stop)
-        if not loop.run(before.get("optimizer")):
-            return None
+        # While pairs are being prepared a signal ends the process at once: what is prepared lies on the disk.
+        with stop_on_signals() as stop:
+            loop = Loop(fabric, recipe, network, training, options.out, record, stop)
+            if not loop.run(before.get("optimizer")):
+                return None
         if fabric.is_global_zero:
             figures = (record.validations, count_parameters(network), _device_name(fabric))
             write_card(options.out / "best", make_card(recipe, progress, training, val, *figures))

@@ -11,7 +11,7 @@ from hybridreg.data.simulate.labelled import pair, pairs, to_labelled
 from hybridreg.data.simulate.overlaps import overlap
 from hybridreg.data.simulate.scenes import SCENES
 from hybridreg.data.simulate.sensors import SENSORS, Sensor
-from hybridreg.data.simulate.splits import SPLITS, VERSION, pair_number
+from hybridreg.data.simulate.splits import SPLITS, pair_number
 from hybridreg.data.simulate.tiers import TIERS, Tier
 
 __all__ = [
@@ -19,7 +19,6 @@ __all__ = [
     "SENSORS",
     "SPLITS",
     "TIERS",
-    "VERSION",
     "Drawn",
     "Sensor",
     "Tier",

@@ -19,7 +19,6 @@ from hybridreg.data.simulate.overlaps import overlap, thin
 from hybridreg.data.simulate.scan import scan
 from hybridreg.data.simulate.scenes import SCENES
 from hybridreg.data.simulate.sensors import SENSORS, SOURCE_SENSORS, TARGET_SENSORS, Sensor
-from hybridreg.data.simulate.splits import VERSION
 from hybridreg.data.simulate.stands import Stand, choose_stands, single_stand
 from hybridreg.data.simulate.tiers import TIERS, Tier, tier_named
 
@@ -38,6 +37,7 @@ class Drawn:
     scene: str
     source_sensor: str
     target_sensor: str
+    version: int  # of the tier that it was drawn for
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,7 @@ class _Streams:
 
     @staticmethod
     def of(tier: str, number: int, attempt: int) -> _Streams:
-        seed = np.random.SeedSequence([VERSION, list(TIERS).index(tier), number, attempt])
+        seed = np.random.SeedSequence([TIERS[tier].version, list(TIERS).index(tier), number, attempt])
         return _Streams(*(np.random.default_rng(s) for s in seed.spawn(5)))
 
 
@@ -112,7 +112,7 @@ def _common(tier: Tier, sensors: tuple[Sensor, Sensor], streams: _Streams) -> Dr
     T = se3.inverse(T_world_target) @ T_world_source
     share = overlap(thin(source, 0.25), thin(target, 0.25), T)
     jpeg = _picture(at_source, layout, T_world_source, streams.camera)
-    return Drawn(source, target, jpeg, T, share, kind, sensors[0].name, sensors[1].name)
+    return Drawn(source, target, jpeg, T, share, kind, sensors[0].name, sensors[1].name, tier.version)
 
 
 def _disjoint(tier: Tier, sensors: tuple[Sensor, Sensor], streams: _Streams) -> Drawn:
@@ -131,7 +131,7 @@ def _disjoint(tier: Tier, sensors: tuple[Sensor, Sensor], streams: _Streams) -> 
     poses[0][:2, 3] += streams.stands.uniform(*tier.distance) * np.array([np.cos(angle), np.sin(angle)])
     T = se3.inverse(poses[1]) @ poses[0]
     share = overlap(thin(scans[0], 0.25), thin(scans[1], 0.25), T)
-    return Drawn(scans[0], scans[1], jpeg, T, share, kind, sensors[0].name, sensors[1].name)
+    return Drawn(scans[0], scans[1], jpeg, T, share, kind, sensors[0].name, sensors[1].name, tier.version)
 
 
 def _picture(world: World, layout: Layout, T_world_source: np.ndarray, rng: np.random.Generator) -> bytes:

@@ -18,7 +18,7 @@ from hybridreg.cloud import PointCloud
 from hybridreg.data.simulate.drawn import Drawn, draw
 from hybridreg.data.simulate.jpeg import decode
 from hybridreg.data.simulate.labelled import pair_id
-from hybridreg.data.simulate.splits import VERSION, pair_number
+from hybridreg.data.simulate.splits import pair_number
 from hybridreg.data.simulate.thinned import thinned
 from hybridreg.data.simulate.tiers import tier_named
 from hybridreg.pair import LabelledPair, Pair
@@ -60,7 +60,7 @@ def _meta(drawn: Drawn, facts: dict[str, Any], voxel: float | None) -> dict[str,
         "overlap": drawn.overlap,
         "scene": drawn.scene,
         "voxel": voxel,
-        "version": VERSION,
+        "version": drawn.version,
         **facts,
     }
 
@@ -99,7 +99,7 @@ def write_one(out: Path, tier: str, split: str, seed: int, index: int, voxel: fl
     """
     folder = out / f"{tier}-{split}-{seed}-{index:06d}"
     if (folder / "meta.json").is_file():
-        _check_kept(folder, voxel)
+        _check_kept(folder, voxel, tier_named(tier).version)
         return folder
     facts = {
         "tier": tier,
@@ -111,9 +111,9 @@ def write_one(out: Path, tier: str, split: str, seed: int, index: int, voxel: fl
     return write_pair(folder, draw(tier, pair_number(split, seed, index)), facts, voxel)
 
 
-def _check_kept(folder: Path, voxel: float | None) -> None:
+def _check_kept(folder: Path, voxel: float | None, version: int) -> None:
     meta = json.loads((folder / "meta.json").read_text())
-    for key, now in (("version", VERSION), ("voxel", voxel)):
+    for key, now in (("version", version), ("voxel", voxel)):
         if meta.get(key) != now:
             raise ValueError(
                 f"{folder}: holds a pair of {key} {meta.get(key)}, not {now}; write to another folder"

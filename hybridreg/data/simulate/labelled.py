@@ -10,7 +10,7 @@ from hybridreg.cloud import PointCloud
 from hybridreg.data.simulate.drawn import Drawn, draw
 from hybridreg.data.simulate.jpeg import decode
 from hybridreg.data.simulate.sensors import Sensor
-from hybridreg.data.simulate.splits import VERSION, pair_number
+from hybridreg.data.simulate.splits import pair_number
 from hybridreg.data.simulate.thinned import thinned
 from hybridreg.pair import LabelledPair, Pair
 
@@ -23,7 +23,7 @@ def to_labelled(drawn: Drawn, id: str, voxel: float | None = None) -> LabelledPa
         target=PointCloud.of(clouds[1], name=f"{id} target", sensor=drawn.target_sensor),
         image=decode(drawn.jpeg),
         id=id,
-        meta={"scene": drawn.scene, "version": VERSION},
+        meta={"scene": drawn.scene, "version": drawn.version},
     )
     return LabelledPair(pair=pair, T_target_source=drawn.T_target_source, overlap=drawn.overlap)
 

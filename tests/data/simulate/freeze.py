@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """What the frozen test split holds: `python tests/data/simulate/freeze.py` writes frozen.json anew.
 
-Run it together with a new `splits.VERSION`, never alone.
+Run it together with a new `Tier.version` in tiers.py, never alone.
 
 Where the processor and the libraries are those that wrote frozen.json, the bytes of both clouds and of the
 photograph must be the same. Elsewhere last bits may differ in sines, products and the ray caster, so that here and
@@ -20,7 +20,7 @@ from typing import Any
 
 import numpy as np
 
-from hybridreg.data.simulate import TIERS, VERSION, draw, pair_number
+from hybridreg.data.simulate import TIERS, draw, pair_number
 from hybridreg.data.simulate.jpeg import decode
 
 FROZEN = Path(__file__).with_name("frozen.json")
@@ -89,5 +89,9 @@ def _installed(name: str) -> str:
 
 if __name__ == "__main__":
     prints = {tier: {str(index): fingerprint(tier, index) for index in NUMBERS} for tier in TIERS}
-    content = {"version": VERSION, "machine": machine(), "pairs": prints}
+    content = {
+        "versions": {name: tier.version for name, tier in TIERS.items()},
+        "machine": machine(),
+        "pairs": prints,
+    }
     FROZEN.write_text(json.dumps(content, indent=None, separators=(",", ":")).replace('},"', '},\n"') + "\n")

@@ -2,12 +2,13 @@
 from __future__ import annotations
 
 import pickle
+from dataclasses import replace
 
 import pytest
 
 from hybridreg.data import YawStarts, open_dataset, simulate, simulated
 from hybridreg.data.dataset import fingerprint_of
-from hybridreg.data.simulate import Drawn, pair_number
+from hybridreg.data.simulate import TIERS, Drawn, pair_number
 
 
 @pytest.fixture
@@ -68,7 +69,8 @@ def test_fingerprint_tells_version_seed_tier_split_and_number_apart(monkeypatch:
     prints = {fingerprint_of(open_dataset(f"sim:{text}")) for text in texts}
     assert len(prints) == len(texts)
     assert fingerprint_of(open_dataset("sim:test/near/0#50")) in prints
-    monkeypatch.setattr(simulated, "VERSION", 1_000)
+    later = replace(TIERS["near"], version=1_000)
+    monkeypatch.setattr(simulated, "tier_named", lambda _: later)
     assert fingerprint_of(open_dataset("sim:test/near")) not in prints
 
 

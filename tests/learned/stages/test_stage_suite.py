@@ -19,6 +19,7 @@ STAGES = [
     hr.Omp(untrained=True),
     hr.Vgam(untrained=True),
     hr.GeoTransformer(untrained=True),
+    hr.DenseFeatures(untrained=True),
     hr.Lgr(),
 ]
 
@@ -66,5 +67,5 @@ def test_a_misfit_names_the_matchers_that_give_groups() -> None:
 
 
 def test_all_are_registered_under_their_names() -> None:
-    expected = ["overlap.omp", "match.vgam", "match.geotransformer", "estimate.lgr"]
+    expected = ["overlap.omp", "match.vgam", "match.geotransformer", "match.dense", "estimate.lgr"]
     assert [registry.name_of(stage) for stage in STAGES] == expected
