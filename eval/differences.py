@@ -40,8 +40,8 @@ def cells(name: str, rows: Sequence[Row], first: Sequence[Row], protocol: Protoc
     mine = [row for row in rows if row.id in theirs and row.T_true is not None]
     other = [theirs[row.id] for row in mine]
     scenes = [scene_of(row) for row in mine]
-    recall = difference(*(errors.of(each).success(protocol).astype(float) for each in (mine, other)), scenes)
-    inliers = difference(*(inlier_ratios(each, protocol) for each in (mine, other)), scenes)
+    recall = difference(_successes(mine, protocol), _successes(other, protocol), scenes)
+    inliers = difference(inlier_ratios(mine, protocol), inlier_ratios(other, protocol), scenes)
     return {
         "method": name,
         "recall %": number(100.0 * recall.mean, 1),
@@ -49,6 +49,10 @@ def cells(name: str, rows: Sequence[Row], first: Sequence[Row], protocol: Protoc
         "inliers %": number(100.0 * inliers.mean, 1),
         "inliers, 95 % interval": _interval(inliers),
     }
+
+
+def _successes(rows: Sequence[Row], protocol: Protocol) -> Array:
+    return errors.of(rows).success(protocol).astype(np.float64)
 
 
 def _interval(found: Difference) -> str:

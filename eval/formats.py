@@ -71,10 +71,11 @@ def tables(table: Table, protocol: Protocol) -> dict[str, list[Cells]]:
 
 
 def _differences(table: Table, protocol: Protocol) -> dict[str, list[Cells]]:
-    first, *others = [entry for entry in table.methods if entry.rows] or [None]
-    if first is None:
+    entries = [entry for entry in table.methods if entry.rows]
+    if not entries:
         return {}
-    lines = [differences.cells(entry.name, entry.rows, first.rows, protocol) for entry in others if entry]
+    first = entries[0]
+    lines = [differences.cells(entry.name, entry.rows, first.rows, protocol) for entry in entries[1:]]
     return {f"Difference to {first.name}, pair by pair": lines}
 
 
