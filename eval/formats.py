@@ -8,7 +8,7 @@ import dataclasses
 import io
 from collections.abc import Sequence
 
-from hybridreg.eval import columns
+from hybridreg.eval import columns, differences
 from hybridreg.eval.columns import Cells
 from hybridreg.eval.controls import MARK
 from hybridreg.eval.protocols import Protocol
@@ -59,6 +59,7 @@ def tables(table: Table, protocol: Protocol) -> dict[str, list[Cells]]:
     with_verdict = [e for e in table.methods if any(row.verdict for row in e.rows)]
     return {
         "Results": [columns.results(name, score) for name, score in scores.items()],
+        **_differences(table, protocol),
         "Recall at fixed thresholds": [columns.thresholds(name, score) for name, score in scores.items()],
         "Recall by overlap": [columns.by_overlap(e.name, e.rows, protocol) for e in table.entries],
         "Overlap mask": [
@@ -67,6 +68,15 @@ def tables(table: Table, protocol: Protocol) -> dict[str, list[Cells]]:
         "Verdict against success": [columns.verdicts(e.name, e.rows, protocol) for e in with_verdict],
         "Seconds of each stage": columns.stages(scores),
     }
+
+
+def _differences(table: Table, protocol: Protocol) -> dict[str, list[Cells]]:
+    entries = [entry for entry in table.methods if entry.rows]
+    if not entries:
+        return {}
+    first = entries[0]
+    lines = [differences.cells(entry.name, entry.rows, first.rows, protocol) for entry in entries[1:]]
+    return {f"Difference to {first.name}, pair by pair": lines}
 
 
 def markdown_table(lines: Sequence[Cells]) -> str:

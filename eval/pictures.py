@@ -1,16 +1,19 @@
 # SPDX-License-Identifier: MIT
-"""A small picture of two clouds before and after, by matplotlib, without a display."""
+"""Pictures of clouds from above, by matplotlib, without a display."""
 
 from __future__ import annotations
 
 import os
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hybridreg import se3
 from hybridreg.io import atomic_path
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 Array = NDArray[np.float64]
 
@@ -26,23 +29,35 @@ def before_after(path: str | os.PathLike[str], source: Array, target: Array, T: 
     source, target : (N, 3), (M, 3), metres
     T : (4, 4), source to target
     """
+    moving, still = thin(source), thin(target)
+    views = {"before": moving, "after": se3.apply(T, moving)}
+    frame = window(np.vstack(list(views.values())))
+    figure = new_figure((10, 5.2))
+    for axes, (title, points) in zip(figure.subplots(1, 2), views.items(), strict=True):
+        _draw(axes, points, still, frame)
+        axes.set_title(f"{title}, from above")
+    save(figure, path)
+
+
+def new_figure(inches: tuple[float, float]) -> Figure:
+    """An empty figure that needs no display."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    moving, still = _thin(source), _thin(target)
-    views = {"before": moving, "after": se3.apply(T, moving)}
-    window = _window(np.vstack(list(views.values())))
-    figure = Figure(figsize=(10, 5.2), dpi=110, layout="constrained")
+    figure = Figure(figsize=inches, dpi=110, layout="constrained")
     FigureCanvasAgg(figure)
-    for axes, (title, points) in zip(figure.subplots(1, 2), views.items(), strict=True):
-        _draw(axes, points, still, window)
-        axes.set_title(f"{title}, from above")
+    return figure
+
+
+def save(figure: Figure, path: str | os.PathLike[str]) -> None:
+    """Write a figure as PNG, whole or not at all."""
     with atomic_path(path) as temporary:
         figure.savefig(temporary, format="png")
 
 
-def _window(points: Array) -> tuple[Array, Array]:
-    # Around the cloud that moves, without its few far returns, which would shrink the scene to a dot.
+def window(points: Array) -> tuple[Array, Array]:
+    """Corners (2,), (2,) of a square around points (N, 3), without their few far returns."""
+    # Those would shrink the scene to a dot.
     low, high = np.quantile(points[:, :2], [0.02, 0.98], axis=0)
     middle, half = (low + high) / 2, 0.65 * float(max(high - low))
     return middle - half, middle + half
@@ -56,5 +71,6 @@ def _draw(axes: Any, source: Array, target: Array, window: tuple[Array, Array]) 
     axes.legend(markerscale=8, loc="upper right")
 
 
-def _thin(points: Array) -> Array:
+def thin(points: Array) -> Array:
+    """The points (N, 3), or some of them where a picture has no room for more."""
     return points[:: max(1, len(points) // _DRAWN)]

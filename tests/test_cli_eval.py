@@ -148,6 +148,19 @@ def test_report_of_single_files_and_of_data_that_has_gone(pairs: Path, tmp_path:
     assert call("report", *files, "--data", "nowhere").exit_code == 2
 
 
+def test_report_draws_what_the_stages_made(pairs: Path, tmp_path: Path) -> None:
+    matching = ["--set", "match=fpfh", "--set", "estimate=svd", "--set", "refine=none", "--voxel", "1.0"]
+    assert call("eval", "--data", pairs, *matching, "--out", "run").exit_code == 0
+    result = call("report", "run", "--pictures", "5")
+    assert result.exit_code == 0, result.output
+    assert "2 pictures in run/pictures" in result.stdout, "the third pair cannot be read"
+    names = {file.name for file in (tmp_path / "run" / "pictures").glob("*/*.png")}
+    assert names == {"a-right-matches.png", "b-off-matches.png"}
+    pairs.rename(tmp_path / "moved")
+    assert "--pictures 1 needs the data" in call("report", "run", "--pictures", "1").stderr
+    assert call("report", "run", "--pictures", "1", "--data", "moved").exit_code == 0
+
+
 @pytest.mark.parametrize(
     ("arguments", "told"),
     [

@@ -13,6 +13,7 @@ from hybridreg.cli import options
 from hybridreg.cli.faults import plainly
 
 if TYPE_CHECKING:
+    from hybridreg.eval.protocols import Protocol
     from hybridreg.eval.table import Table
     from hybridreg.pair import LabelledPair
 
@@ -23,6 +24,9 @@ def command(
     protocols: options.Protocols = None,
     data: Annotated[str | None, typer.Option(help="Where the data lies now, for the 3D views.")] = None,
     out: Annotated[Path | None, typer.Option(help="Folder; the table's own if not given.")] = None,
+    pictures: Annotated[
+        int, typer.Option(min=0, help="Run the pipelines again on so many pairs and draw matches and masks.")
+    ] = 0,
 ) -> None:
     """Write the reports of a table anew, under any protocol."""
     from hybridreg.cli import running
@@ -35,7 +39,18 @@ def command(
     else:
         done, names = table.of_files(paths), ["cross3dreg", "kitti"]
     chosen = [protocol(name) for name in protocols or names]
-    running.write(done, chosen, out or folder or Path("runs/report"), _data(done, data))
+    written, pairs = out or folder or Path("runs/report"), _data(done, data)
+    running.write(done, chosen, written, pairs)
+    if pictures:
+        _draw(done, chosen[0], pairs, written / "pictures", pictures)
+
+
+def _draw(done: Table, chosen: Protocol, pairs: Sequence[LabelledPair] | None, folder: Path, n: int) -> None:
+    from hybridreg.eval.redrawing import redraw
+
+    if pairs is None:
+        raise ValueError(f"--pictures {n} needs the data {done.data!r}, which is not here; name it by --data")
+    print(f"{len(redraw(done, chosen, pairs, folder, n))} pictures in {folder}")
 
 
 def _data(done: Table, data: str | None) -> Sequence[LabelledPair] | None:

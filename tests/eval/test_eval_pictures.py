@@ -38,5 +38,5 @@ def test_the_picture_shows_both_clouds_before_and_after(tmp_path: Path) -> None:
 def test_map_returns_far_away_do_not_shrink_the_scene() -> None:
     near = np.random.default_rng(0).uniform(-10, 10, (1000, 3))
     stray = np.vstack([near, [[900.0, 900.0, 0.0]]])
-    low, high = pictures._window(stray)
+    low, high = pictures.window(stray)
     assert np.all(high - low < 30.0)

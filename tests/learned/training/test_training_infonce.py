@@ -30,6 +30,7 @@ def by_hand(
     anchors: Tensor, candidates: Tensor, points: Tensor, partner: Tensor, config: InfoNceConfig
 ) -> tuple[float, float]:
     """Loss and hits, one anchor and one candidate at a time."""
+    anchors, candidates = anchors.detach(), candidates.detach()
     losses, hits = [], []
     for i, true in enumerate(partner.tolist()):
         if true < 0:

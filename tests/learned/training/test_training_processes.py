@@ -17,12 +17,15 @@ from hybridreg.learned.training.run import train
 
 
 def test_two_gloo_processes_equal_one(content: dict[str, Any], cache: Path, tmp_path: Path) -> None:
-    phase = {"accumulate": 2, "rate": 1e-3, "steps": 2}
+    phase = {"accumulate": 2, "rate": 1e-3}
     short = {
         **content,
         "data": {"train": content["data"]["train"]},
         "log_every": 1,
-        "phase": [{**phase, "name": "warm-up", "losses": WARM_UP}, {**phase, "name": "matching"}],
+        "phase": [
+            {**phase, "name": "warm-up", "steps": 1, "losses": WARM_UP},
+            {**phase, "name": "matching", "steps": 2},
+        ],
     }
     file = write_recipe(tmp_path / "short.toml", short)
     several = [sys.executable, "-m", "torch.distributed.run", "--standalone", "--nproc-per-node=2"]
