@@ -45,7 +45,7 @@ def content(pairs: Path) -> dict[str, Any]:
         },
         "phase": [
             {"name": "warm-up", "steps": 4, "rate": 2e-3, "warmup": 2, "decay": "linear", "losses": WARM_UP},
-            {"name": "matching", "steps": 4, "rate": 1e-3, "accumulate": 2, "use_predicted": 0.5},
+            {"name": "matching", "steps": 4, "rate": 1e-3, "use_predicted": 0.5},
         ],
     }
 

@@ -52,7 +52,7 @@ def test_equals_a_double_loop(exclusion: float) -> None:
     case = example()
     found = infonce(*case, config, VOXEL, torch.Generator())
     loss, hits = by_hand(*case, config)
-    assert float(found.loss) == pytest.approx(loss, abs=1e-9)
+    assert found.loss.item() == pytest.approx(loss, abs=1e-9)
     # Without a zone the partner itself is not nearer than its edge: nothing can be hit.
     assert float(found.hits) == pytest.approx(hits, abs=1e-6)
 
@@ -60,7 +60,7 @@ def test_equals_a_double_loop(exclusion: float) -> None:
 def test_the_zone_takes_negatives_away() -> None:
     case = example()
     losses = [
-        float(infonce(*case, InfoNceConfig(exclusion=zone), VOXEL, torch.Generator()).loss)
+        infonce(*case, InfoNceConfig(exclusion=zone), VOXEL, torch.Generator()).loss.item()
         for zone in (0.0, 3.0, 6.0, 100.0)
     ]
     assert losses == sorted(losses, reverse=True)

@@ -78,7 +78,7 @@ def test_sigterm_finishes_the_step_and_saves(
         assert train(whole.recipe, options(tmp_path / "run", cache)) is None
     assert signal.getsignal(signal.SIGTERM) == before
     progress = checkpoint.load(tmp_path / "run" / "checkpoint.pt")["progress"]
-    # The fifth call belongs to the fifth step, the first of the second phase and of two pairs.
+    # The fifth call belongs to the fifth step, the first of the second phase.
     assert (progress.phase, progress.step, progress.total) == (1, 1, 5)
     train(whole.recipe, options(tmp_path / "run", cache, resume=True))
     assert same(state(tmp_path / "run"), state(whole.out))
