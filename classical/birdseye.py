@@ -82,8 +82,7 @@ class BirdsEye(Stage):
             scene.note("bird's-eye search: nothing stands on the ground")
             return Pose.unknown()
         starts = [se3.inverse(frames[1]) @ M @ frames[0] for M in self._planar(views[0], views[1], voxel)]
-        ranked = best_first(scene, starts)
-        return Pose(ranked[0].T, rivals=np.array([one.T for one in ranked[1:]]).reshape(-1, 4, 4))
+        return Pose.ranked([one.T for one in best_first(scene, starts)])
 
     def _view(self, own: Scene, side: Side, T_level_cloud: Array, voxel: float) -> FromAbove:
         level = getattr(own, side)

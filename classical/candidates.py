@@ -98,7 +98,7 @@ def _promising(settled: Rival) -> bool:
 
 
 def _best_of(found: list[Rival]) -> Pose:
-    return Pose(found[0].T, rivals=np.array([rival.T for rival in found[1:]]).reshape(-1, 4, 4))
+    return Pose.ranked([rival.T for rival in found])
 
 
 def _built(entry: Entry) -> Entry:

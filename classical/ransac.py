@@ -101,7 +101,7 @@ class Ransac(Stage):
         if not found:
             return Pose.unknown(len(matches))
         residual = np.linalg.norm(se3.apply(found[0], matches.source) - matches.target, axis=1)
-        return Pose(found[0], inliers=residual < max_distance, rivals=np.array(found[1:]).reshape(-1, 4, 4))
+        return Pose.ranked(found, inliers=residual < max_distance)
 
     def _rows(self, scene: Scene, matches: Correspondences, rng: np.random.Generator) -> NDArray[np.int64]:
         finite = np.isfinite(matches.source).all(axis=1) & np.isfinite(matches.target).all(axis=1)

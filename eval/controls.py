@@ -66,10 +66,16 @@ class TrueOverlap:
     T: Array
 
     def __call__(self, scene: Scene) -> Overlap:
-        moved, target = se3.apply(self.T, scene.source.points), scene.target.points
-        radius = 2.0 * scene.spacing
         scene.note("control: the overlap was taken from the truth, this is no method")
-        return Overlap(near(moved, target, radius).astype(float), near(target, moved, radius).astype(float))
+        source, target = true_overlap(scene, self.T)
+        return Overlap(source.astype(float), target.astype(float))
+
+
+def true_overlap(scene: Scene, T: Array) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Which points (n,) of the source's level and (m,) of the target's have one of the other within twice the
+    spacing under the true pose T."""
+    moved, target, radius = se3.apply(T, scene.source.points), scene.target.points, 2.0 * scene.spacing
+    return near(moved, target, radius), near(target, moved, radius)
 
 
 def near(points: Array, others: Array, radius: float) -> NDArray[np.bool_]:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from hybridreg import se3
 from hybridreg.eval import metrics
-from hybridreg.eval.controls import near
+from hybridreg.eval.controls import true_overlap
 from hybridreg.eval.pictures import new_figure, save, thin, window
 from hybridreg.pipeline import Trace
 
@@ -69,11 +69,10 @@ def mask(path: str | os.PathLike[str], trace: Trace, T_true: Array) -> None:
     kept when its probability is above one half. The photograph stands beside them where there is one.
     """
     scene, overlap = trace.scene, trace.overlap
-    moved, radius = se3.apply(T_true, scene.source.points), 2.0 * scene.spacing
-    target = scene.target.points
+    in_source, in_target = true_overlap(scene, T_true)
     sides = (
-        ("source", scene.source.points, overlap.source > 0.5, near(moved, target, radius)),
-        ("target", target, overlap.target > 0.5, near(target, moved, radius)),
+        ("source", scene.source.points, overlap.source > 0.5, in_source),
+        ("target", scene.target.points, overlap.target > 0.5, in_target),
     )
     figure = new_figure((16, 5.2))
     panels = figure.subplots(1, 3)

@@ -6,12 +6,11 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from hybridreg import se3
 from hybridreg.eval import metrics
 from hybridreg.eval.attempt import Attempt
-from hybridreg.eval.controls import near
+from hybridreg.eval.controls import near, true_overlap
 from hybridreg.eval.protocols import INLIER_RADII
 from hybridreg.eval.row import Matrix, Row, matrix
 from hybridreg.frames import lower_pose
@@ -91,8 +90,7 @@ def _overlap(labelled: LabelledPair) -> dict[str, Any]:
     radius = default_voxel(pair.source.points, pair.target.points)
     sample = pair.source.points[:: max(1, len(pair.source) // _SAMPLE)]
     moved = se3.apply(lower_pose(labelled.T_target_source, pair), sample)
-    distance, _ = cKDTree(pair.target.points).query(moved, distance_upper_bound=radius)
-    common = sample[np.isfinite(distance)]
+    common = sample[near(moved, pair.target.points, radius)]
     return {
         "overlap": len(common) / len(sample),
         "overlap_radius": radius,
@@ -116,9 +114,5 @@ def _mask(trace: Trace, labelled: LabelledPair) -> dict[str, float] | None:
     predicted = np.concatenate([trace.overlap.source, trace.overlap.target])
     if np.all(predicted == 1.0):
         return None
-    truth = lower_pose(labelled.T_target_source, labelled.pair)
-    scene = trace.scene
-    moved, target = se3.apply(truth, scene.source.points), scene.target.points
-    radius = 2.0 * scene.spacing
-    seen = [near(moved, target, radius), near(target, moved, radius)]
-    return metrics.mask_scores(predicted > 0.5, np.concatenate(seen))._asdict()
+    truth = true_overlap(trace.scene, lower_pose(labelled.T_target_source, labelled.pair))
+    return metrics.mask_scores(predicted > 0.5, np.concatenate(truth))._asdict()

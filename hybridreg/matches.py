@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -102,6 +103,11 @@ class Pose:
     inliers: NDArray[np.bool_] | None = None
     rivals: Array = field(default_factory=lambda: np.zeros((0, 4, 4)))
     found: bool = True
+
+    @classmethod
+    def ranked(cls, poses: Sequence[Array], inliers: NDArray[np.bool_] | None = None) -> Pose:
+        """The first of `poses` (4, 4), at least one, with the others as its rivals; `inliers` are the first one's."""
+        return cls(poses[0], inliers, np.array(poses[1:]).reshape(-1, 4, 4))
 
     @classmethod
     def unknown(cls, n_matches: int = 0) -> Pose:

@@ -45,6 +45,11 @@ class BackboneConfig:
             raise ValueError(f"init_dim {self.init_dim} halved must be divisible by groups {self.groups}")
 
     @property
+    def fine_voxel(self) -> float:
+        """Spacing (m) of the points that are matched."""
+        return self.voxel * 2 ** (self.fine_stage - 1)
+
+    @property
     def coarse_dim(self) -> int:
         """Width of the superpoint features."""
         return self.init_dim * 2**self.stages

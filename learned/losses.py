@@ -8,13 +8,9 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
-from hybridreg.learned.circle_loss import circle_loss
 from hybridreg.learned.config import LossConfig
-from hybridreg.learned.fine_loss import assignment_loss
 from hybridreg.learned.mask_loss import focal_loss
-from hybridreg.learned.network import Encoding
 from hybridreg.learned.omp import OverlapLogits
-from hybridreg.learned.patch_pairs import PatchPairs
 from hybridreg.learned.superpoint_mask import Kept
 from hybridreg.learned.targets import Targets
 
@@ -56,26 +52,3 @@ def mask_loss(overlap: OverlapLogits | None, targets: Targets, config: LossConfi
         for logits, truth in sides
     ]
     return torch.stack(losses).mean()
-
-
-def compute_losses(
-    encoding: Encoding,
-    overlap: OverlapLogits | None,
-    kept: tuple[Kept, Kept],
-    features: tuple[Tensor, Tensor],
-    pairs: PatchPairs,
-    assignment: Tensor,
-    targets: Targets,
-    config: LossConfig,
-) -> Losses:
-    """All losses of a step: features (m, c), (n, c) of kept superpoints, assignments of patch pairs."""
-    fine = assignment_loss(
-        assignment,
-        pairs,
-        encoding.target.points,
-        encoding.source.points,
-        targets.transform,
-        config.positive_radius,
-    )
-    coarse = circle_loss(*features, overlap_matrix(targets, kept), config)
-    return Losses(coarse, fine, mask_loss(overlap, targets, config))

@@ -7,7 +7,9 @@ import torch
 from torch import Tensor
 
 from hybridreg.learned.batch import Batch
-from hybridreg.learned.losses import Losses, compute_losses
+from hybridreg.learned.circle_loss import circle_loss
+from hybridreg.learned.fine_loss import assignment_loss
+from hybridreg.learned.losses import Losses, mask_loss, overlap_matrix
 from hybridreg.learned.network import Encoding, RegistrationNetwork
 from hybridreg.learned.omp import OverlapLogits
 from hybridreg.learned.superpoint_mask import Kept
@@ -40,10 +42,26 @@ def training_losses(
     kept = keep_for_training(network, encoding, overlap, targets, jitter or MaskJitter(), generator)
     features = network.attend(encoding, kept)
     config = network.config.loss
+    return Losses(
+        circle_loss(*features, overlap_matrix(targets, kept), config),
+        fine_loss(network, encoding, targets, generator),
+        mask_loss(overlap, targets, config),
+    )
+
+
+def fine_loss(
+    network: RegistrationNetwork, encoding: Encoding, targets: Targets, generator: torch.Generator
+) -> Tensor:
+    """Fine loss on random true patch pairs (methods 7.4)."""
+    config = network.config.loss
     chosen = sample_target_pairs(targets, config.positive_overlap, config.targets, generator)
-    pairs = network.pair_up(encoding, targets.target[chosen], targets.source[chosen])
+    target, source = targets.target[chosen], targets.source[chosen]
+    # The noise of the augmentation may have taken the only point of a patch to the next one.
+    owning = encoding.target.patches.occupied[target] & encoding.source.patches.occupied[source]
+    pairs = network.pair_up(encoding, target[owning], source[owning])
     assignment = network.assign(encoding, pairs, "log", config.training_sinkhorn_iterations)
-    return compute_losses(encoding, overlap, kept, features, pairs, assignment, targets, config)
+    points = (encoding.target.points, encoding.source.points)
+    return assignment_loss(assignment, pairs, *points, targets.transform, config.positive_radius)
 
 
 def sample_target_pairs(targets: Targets, min_overlap: float, limit: int, rng: torch.Generator) -> Tensor:

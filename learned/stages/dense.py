@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -60,12 +60,11 @@ class DenseFeatures(NetworkStage):
         ]
         found = nearest(features[0][rows[0]], features[1][rows[1]])
         source, target = rows[0][found.mutual], rows[1][found.row[found.mutual]]
-        backbone: Any = self.network().config.backbone
         return Correspondences(
             source=points[0][source],
             target=points[1][target],
             weight=np.maximum(np.sum(features[0][source] * features[1][target], axis=1), 0.0),
-            spacing=backbone.voxel * 2 ** (backbone.fine_stage - 1),
+            spacing=self.network().config.backbone.fine_voxel,
         )
 
     def _rows(self, points: Array, level: Array, probability: Array) -> Indices:

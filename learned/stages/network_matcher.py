@@ -53,11 +53,10 @@ class NetworkMatcher(NetworkStage):
 def _correspondences(matches: PointMatches, network: RegistrationNetwork) -> Correspondences:
     from hybridreg.learned.stages.arrays import array
 
-    backbone = network.config.backbone
     return Correspondences(
         source=array(matches.source),
         target=array(matches.target),
         weight=array(matches.weight),
         group=matches.group.cpu().numpy(),
-        spacing=backbone.voxel * 2 ** (backbone.fine_stage - 1),
+        spacing=network.config.backbone.fine_voxel,
     )

@@ -9,7 +9,6 @@ import torch
 from torch import Tensor
 
 from hybridreg.learned.circle_loss import circle_loss
-from hybridreg.learned.fine_loss import assignment_loss
 from hybridreg.learned.infonce_loss import InfoNceConfig, infonce
 from hybridreg.learned.losses import mask_loss, overlap_matrix
 from hybridreg.learned.network import Encoding, RegistrationNetwork
@@ -17,7 +16,7 @@ from hybridreg.learned.superpoint_mask import Kept
 from hybridreg.learned.training.recipe import LossWeights
 from hybridreg.learned.training.samples import Sample
 from hybridreg.learned.training_mask import MaskJitter
-from hybridreg.learned.training_step import keep_for_training, sample_target_pairs
+from hybridreg.learned.training_step import fine_loss, keep_for_training
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -50,7 +49,7 @@ def objective(
     """Losses of a sample, ready for ``backward``. The network must be in training mode."""
     hits: Tensor | None = None
     if not weights.matcher:
-        points, features = _fine_features(network, sample)
+        points, features = fine_features(network, sample)
         loss, hits = contrastive_loss(network, sample, points, features, contrast, generator)
         return Outcome(total=weights.infonce * loss, parts={"infonce": loss}, hits=hits)
     encoding = network.encode(sample.batch)
@@ -69,24 +68,9 @@ def objective(
         truth = overlap_matrix(sample.targets, kept)
         parts["coarse"] = circle_loss(*matched.features, truth, network.config.loss)
     if weights.fine:
-        parts["fine"] = fine_loss(network, encoding, sample, generator)
+        parts["fine"] = fine_loss(network, encoding, sample.targets, generator)
     total = torch.stack([getattr(weights, name) * loss for name, loss in parts.items()]).sum()
     return Outcome(total=total, parts=parts, hits=hits, matched=matched)
-
-
-def fine_loss(
-    network: RegistrationNetwork, encoding: Encoding, sample: Sample, generator: torch.Generator
-) -> Tensor:
-    """Fine loss on random true patch pairs (methods 7.4)."""
-    config, targets = network.config.loss, sample.targets
-    chosen = sample_target_pairs(targets, config.positive_overlap, config.targets, generator)
-    target, source = targets.target[chosen], targets.source[chosen]
-    # The noise of the augmentation may have taken the only point of a patch to the next one.
-    owning = encoding.target.patches.occupied[target] & encoding.source.patches.occupied[source]
-    pairs = network.pair_up(encoding, target[owning], source[owning])
-    assignment = network.assign(encoding, pairs, "log", config.training_sinkhorn_iterations)
-    points = (encoding.target.points, encoding.source.points)
-    return assignment_loss(assignment, pairs, *points, targets.transform, config.positive_radius)
 
 
 def contrastive_loss(
@@ -106,9 +90,10 @@ def contrastive_loss(
     return (forth.loss + back.loss) / 2, (forth.hits + back.hits) / 2
 
 
-def _fine_features(
+def fine_features(
     network: RegistrationNetwork, sample: Sample
 ) -> tuple[tuple[Tensor, Tensor], tuple[Tensor, Tensor]]:
+    """Fine points and their features from the backbone alone, target first."""
     pyramid = sample.batch.pyramid
     stage = network.config.backbone.fine_stage - 1
     _, fine = network.backbone(sample.batch.features, pyramid)

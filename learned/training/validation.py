@@ -19,6 +19,7 @@ from hybridreg.learned.lgr import local_to_global
 from hybridreg.learned.network import RegistrationNetwork
 from hybridreg.learned.superpoint_matching import SuperpointMatches
 from hybridreg.learned.targets import Targets
+from hybridreg.learned.training.objective import fine_features
 from hybridreg.learned.training.pair_source import PairSource
 from hybridreg.learned.training.samples import Sample, undisturbed
 
@@ -107,14 +108,11 @@ def _matched(network: RegistrationNetwork, sample: Sample, number: int) -> tuple
 
 
 def _described(network: RegistrationNetwork, sample: Sample, number: int) -> Row:
-    pyramid = sample.batch.pyramid
-    stage = network.config.backbone.fine_stage - 1
-    _, fine = network.backbone(sample.batch.features, pyramid)
-    target, source = F.normalize(fine, dim=1).split(list(pyramid.lengths[stage]))
+    points, features = fine_features(network, sample)
+    target, source = (F.normalize(each, dim=1) for each in features)
     scores = source @ target.t()
     best, back = scores.argmax(1), scores.argmax(0)
     mutual = (back[best] == torch.arange(len(best), device=best.device)).nonzero()[:, 0]
-    points = pyramid.clouds(stage)
     return _row(sample, number, points[1][mutual], points[0][best[mutual]], None)
 
 
