@@ -54,7 +54,9 @@ def make_batch(
     device
         Where the neighbours are searched and the tensors end up.
     """
-    clouds = [torch.from_numpy(np.array(c, dtype=np.float32)).to(device) for c in (target, source)]
+    reach = config.backbone.max_range
+    near = [cloud if reach is None else _within(cloud, reach) for cloud in (target, source)]
+    clouds = [torch.from_numpy(np.array(cloud, dtype=np.float32)).to(device) for cloud in near]
     pyramid = build_pyramid(clouds[0], clouds[1], config.backbone, subsample=subsample)
     tensor = None
     if image is not None and config.image is not None:
@@ -62,3 +64,9 @@ def make_batch(
     return Batch(
         pyramid=pyramid, features=input_features(pyramid, config.backbone.input_features), image=tensor
     )
+
+
+def _within(points: npt.NDArray[np.floating], reach: float) -> npt.NDArray[np.floating]:
+    # From the median, not from the origin: a cloud in map coordinates loses nothing of its middle.
+    away = points[:, :2] - np.median(points[:, :2], axis=0)
+    return points[np.hypot(away[:, 0], away[:, 1]) <= reach]

@@ -19,6 +19,7 @@ class BackboneConfig:
 
     stages: int = 5
     voxel: float = 0.25
+    max_range: float | None = None  # metres from the cloud's median; farther points are left out
     base_radius: float = 4.25  # search radius in voxels of the stage
     base_sigma: float = 2.0  # reach of a kernel point in voxels of the stage
     neighbor_limits: tuple[int, ...] = DEFAULT_NEIGHBOR_LIMITS
@@ -39,6 +40,8 @@ class BackboneConfig:
             raise ValueError(
                 f"{len(self.neighbor_limits)} neighbor_limits for {self.stages} stages: give one a stage"
             )
+        if self.max_range is not None and not self.max_range > 0:
+            raise ValueError(f"max_range {self.max_range} must be above 0 m; null keeps all points")
         if not 1 <= self.fine_stage < self.stages:
             raise ValueError(f"fine_stage {self.fine_stage} must lie in 1..{self.stages - 1}")
         if (self.init_dim // 2) % self.groups:

@@ -22,7 +22,7 @@ from hybridreg.learned.training.tensor_cache import Tensors
 from hybridreg.pair import LabelledPair
 
 # Raised when the prepared tensors change their meaning.
-VERSION = 1
+VERSION = 2
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -45,6 +45,7 @@ def cloud_key(config: NetworkConfig, partner: float) -> tuple[object, ...]:
     shape = [
         backbone.stages,
         backbone.voxel,
+        backbone.max_range,
         backbone.base_radius,
         backbone.neighbor_limits,
         backbone.fine_stage,
