@@ -104,10 +104,11 @@ class RegistrationNetwork(nn.Module):
             matches=matches,
         )
 
-    def encode(self, batch: Batch) -> Encoding:
-        """Run the encoders and group fine points into patches."""
+    def encode(self, batch: Batch, features: tuple[Tensor, Tensor] | None = None) -> Encoding:
+        """Run the encoders and group fine points into patches; ``features`` spares the backbone where its output
+        for this batch is known."""
         pyramid = batch.pyramid
-        coarse, fine = self.backbone(batch.features, pyramid)
+        coarse, fine = self.backbone(batch.features, pyramid) if features is None else features
         nodes = coarse.split(list(pyramid.lengths[-1]))
         points = fine.split(list(pyramid.lengths[self.config.backbone.fine_stage - 1]))
         return Encoding(

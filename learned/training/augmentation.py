@@ -49,6 +49,12 @@ class Augmentation:
         """Does it change the neighbours?"""
         return self.scale != (1.0, 1.0)
 
+    @property
+    def upright(self) -> bool:
+        """Does it only turn clouds about the vertical and shift them?"""
+        tilts = self.rotation == "full" or (self.rotation == "yaw" and self.tilt != 0.0)
+        return not tilts and self.jitter == 0.0 and not self.rescales
+
     def draw_scale(self, rng: np.random.Generator) -> float:
         """A factor from the range; the generator is left alone where there is none to choose from."""
         return float(rng.uniform(self.scale[0], self.scale[1])) if self.rescales else 1.0

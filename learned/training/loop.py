@@ -16,6 +16,7 @@ from torch import nn
 from hybridreg.learned.network import RegistrationNetwork
 from hybridreg.learned.training import checkpoint
 from hybridreg.learned.training.checkpoint import Progress
+from hybridreg.learned.training.frozen import FrozenFeatures, lasting
 from hybridreg.learned.training.gradients import StepOutcome, finish_step
 from hybridreg.learned.training.objective import Outcome, objective
 from hybridreg.learned.training.order import Order
@@ -71,10 +72,12 @@ class Loop:
         samples, steps = self._samples(phase, batch)
         parameters = trainable(optimizer)
         self.record.begin_phase(phase, steps)
+        keep = lasting(phase, self.recipe.augmentation, self.recipe.network.backbone)
+        self._frozen = FrozenFeatures(self.network, keep)
         upcoming = stream(samples, self._numbers(batch, steps), self.recipe.data.loaders)
         for step in range(self.progress.step, steps):
             set_rate(optimizer, rate_at(phase, step, steps))
-            bad = self._gather(phase, upcoming, step * batch, batch)
+            bad = self._gather(phase, samples, upcoming, step * batch, batch)
             votes = (self.stop.asked, self._due())
             outcome = finish_step(self.fabric, optimizer, parameters, bad, self.recipe.clip, *votes)
             self._note(outcome, samples, range(step * batch, (step + 1) * batch))
@@ -89,7 +92,12 @@ class Loop:
         return True
 
     def _gather(
-        self, phase: Phase, upcoming: Iterator[Sample | Unusable], first: int, batch: int
+        self,
+        phase: Phase,
+        samples: PhaseSamples,
+        upcoming: Iterator[Sample | Unusable],
+        first: int,
+        batch: int,
     ) -> torch.Tensor:
         # Gradients of this process's share of the batch; 1 in the answer where a loss was not finite.
         bad = torch.zeros(batch, device=self.fabric.device)
@@ -101,7 +109,8 @@ class Loop:
                 _log.warning("pair %s cannot be used: %s", sample.id, sample.problem)
                 bad[place] = 1.0
                 continue
-            outcome = self._forward(phase, sample.to(self.fabric.device))
+            pair = samples.order[sample.number]
+            outcome = self._forward(phase, sample.to(self.fabric.device), pair)
             if bool(torch.isfinite(outcome.total)):
                 (outcome.total / batch).backward()
                 self.record.outcome(self.network, outcome, sample)
@@ -109,7 +118,7 @@ class Loop:
                 bad[place] = 1.0
         return bad
 
-    def _forward(self, phase: Phase, sample: Sample) -> Outcome:
+    def _forward(self, phase: Phase, sample: Sample, pair: tuple[int, int]) -> Outcome:
         seeds = np.random.SeedSequence([*self._seed(), 3, sample.number]).generate_state(2)
         torch.manual_seed(int(seeds[0]))  # for what the network itself draws: images left out
         generator = torch.Generator().manual_seed(int(seeds[1]))
@@ -121,6 +130,7 @@ class Loop:
                 self.recipe.infonce,
                 MaskJitter(use_predicted=phase.use_predicted),
                 generator,
+                self._frozen.of(pair, sample.batch),
             )
 
     def _samples(self, phase: Phase, batch: int) -> tuple[PhaseSamples, int]:

@@ -45,14 +45,18 @@ def objective(
     contrast: InfoNceConfig,
     jitter: MaskJitter,
     generator: torch.Generator,
+    features: tuple[Tensor, Tensor] | None = None,
 ) -> Outcome:
-    """Losses of a sample, ready for ``backward``. The network must be in training mode."""
+    """Losses of a sample, ready for ``backward``. The network must be in training mode.
+
+    ``features`` is the output of a frozen backbone for this sample, where it is known.
+    """
     hits: Tensor | None = None
     if not weights.matcher:
         points, features = fine_features(network, sample)
         loss, hits = contrastive_loss(network, sample, points, features, contrast, generator)
         return Outcome(total=weights.infonce * loss, parts={"infonce": loss}, hits=hits)
-    encoding = network.encode(sample.batch)
+    encoding = network.encode(sample.batch, features)
     parts: dict[str, Tensor] = {}
     if weights.infonce:
         points = (encoding.target.points, encoding.source.points)
