@@ -35,13 +35,27 @@ def read(path: str | os.PathLike[str]) -> Recipe:
         Not TOML, an unknown key, or a value that cannot be.
     """
     name = os.fspath(path)
-    file = recipes.find(name)
+    table = _content(name)
     try:
-        return parse(tomllib.loads(file.read_text(encoding="utf-8")), name=Path(name).stem)
-    except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise ValueError(f"{name}: not a TOML file ({error})") from error
+        return parse(table, name=Path(name).stem)
     except (ValueError, KeyError) as error:
         raise ValueError(f"{name}: {error.args[0]}") from error
+
+
+def _content(name: str, behind: tuple[str, ...] = ()) -> dict[str, Any]:
+    # ``base`` names a recipe whose values count where this one gives none; tables are merged, lists replaced.
+    if name in behind:
+        raise ValueError(f"{behind[0]}: base goes round in a circle: {' -> '.join((*behind, name))}")
+    try:
+        table = tomllib.loads(recipes.find(name).read_text(encoding="utf-8"))
+    except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        raise ValueError(f"{name}: not a TOML file ({error})") from error
+    base = table.pop("base", None)
+    if base is None:
+        return table
+    if not isinstance(base, str):
+        raise ValueError(f"{name}: base={base!r} must be the name or the path of a recipe")
+    return _merged(_content(base, (*behind, name)), table)
 
 
 def parse(table: Mapping[str, Any], *, name: str) -> Recipe:

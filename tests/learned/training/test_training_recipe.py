@@ -65,6 +65,31 @@ def test_a_file_that_is_none(tmp_path: Path) -> None:
         recipe_file.read(tmp_path / "x.toml")
 
 
+def test_a_recipe_may_build_on_another(content: dict[str, Any], tmp_path: Path) -> None:
+    first = write_recipe(tmp_path / "first.toml", {**content, "network": {"backbone": {"voxel": 0.7}}})
+    changes = {"base": str(first), "omp": False, "network": {"backbone": {"kernel": "cylindrical"}}}
+    second = write_recipe(tmp_path / "second.toml", {**changes, "phase": [PHASE]})
+    recipe = recipe_file.read(second)
+    assert recipe.name == "second"
+    assert (recipe.network.backbone.voxel, recipe.network.backbone.kernel) == (0.7, "cylindrical")
+    assert recipe.network.omp is None
+    assert [phase.name for phase in recipe.phase] == ["p"]
+    assert recipe.data == recipe_file.read(first).data
+
+
+def test_a_base_that_is_none(content: dict[str, Any], tmp_path: Path) -> None:
+    one, two = tmp_path / "one.toml", tmp_path / "two.toml"
+    write_recipe(one, {**content, "base": str(two)})
+    write_recipe(two, {**content, "base": str(one)})
+    with pytest.raises(
+        ValueError, match=r"one\.toml: base goes round in a circle: .*two\.toml -> .*one\.toml"
+    ):
+        recipe_file.read(one)
+    write_recipe(two, {**content, "base": 3})
+    with pytest.raises(ValueError, match=r"two\.toml: base=3 must be the name or the path"):
+        recipe_file.read(two)
+
+
 @pytest.mark.parametrize("name", recipes.names())
 def test_shipped_recipes_are_sound_and_name_no_folder(name: str) -> None:
     recipe = recipe_file.read(name)
