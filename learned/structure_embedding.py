@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import math
+from functools import reduce
 
 import torch
 from torch import Tensor, nn
@@ -53,7 +54,8 @@ class StructureEmbedding(nn.Module):
         if nearest.shape[1] == 0:  # a single superpoint spans no angle
             return embedding
         angles = neighbor_angles(points[block], points, points[nearest]) * self.angle_scale  # (b, n, k)
-        return embedding.add_(interpolate(curves[1], angles).amax(2))
+        # One by one: the gradient of a largest value over a dimension makes four passes more.
+        return embedding.add_(reduce(torch.maximum, interpolate(curves[1], angles).unbind(2)))
 
     def _curve(self, layer: nn.Linear, highest: float) -> Tensor:
         """Samples of the embedding of a number: n^2 (k + 1) sines and products would say no more."""
