@@ -21,12 +21,21 @@ from hybridreg.learned.sizes import named_config
 from hybridreg.shipped_weights import CONFIG_FILE, WEIGHTS_FILE, find, names
 
 
-def save_pretrained(network: RegistrationNetwork, folder: str | os.PathLike[str]) -> None:
-    """Write ``config.json`` and ``model.safetensors`` into a folder, each whole or not at all."""
+def save_pretrained(
+    network: RegistrationNetwork, folder: str | os.PathLike[str], *, half: bool = False
+) -> None:
+    """Write ``config.json`` and ``model.safetensors`` into a folder, each whole or not at all.
+
+    ``half`` stores float16, half the size; a network that reads it computes in float32 all the same.
+    """
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
     text = json.dumps(network.config.to_dict(), indent=1) + "\n"
     tensors = {name: tensor.detach().cpu().contiguous() for name, tensor in network.state_dict().items()}
+    if half:
+        tensors = {
+            name: tensor.half() if tensor.is_floating_point() else tensor for name, tensor in tensors.items()
+        }
     # Serialised here: safetensors would replace the file by one that its owner alone can read.
     write_bytes(folder / WEIGHTS_FILE, save(tensors))
     write_text(folder / CONFIG_FILE, text)
