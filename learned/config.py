@@ -134,7 +134,12 @@ class TransformerConfig:
 
 @dataclass(frozen=True, kw_only=True)
 class MatchingConfig:
-    """Superpoint and point matching (methods 7, 8)."""
+    """Superpoint and point matching (methods 7, 8).
+
+    The last three are ours, at inference only, and off by default, as published: fine points vote for pairs of
+    superpoints and matches are weighed by how unique they are; matches below ``uniqueness`` and those that do not move
+    with the others are left out.
+    """
 
     superpoint_matches: int = 256
     dual_normalization: bool = True
@@ -148,6 +153,19 @@ class MatchingConfig:
     topk: int = 2
     mutual: bool = True
     confidence: float = 0.05
+    vote_temperature: float | None = None  # of the cosine of two fine features
+    uniqueness: float = 0.0  # least product of both softmaxes over all points; needs vote_temperature
+    consistency: float | None = None  # metres by which distances between matches may differ
+
+    def __post_init__(self) -> None:
+        for name in ("vote_temperature", "consistency"):
+            value = getattr(self, name)
+            if value is not None and not value > 0:
+                raise ValueError(f"{name} {value} must be above 0; null switches it off")
+        if not 0.0 <= self.uniqueness < 1.0:
+            raise ValueError(f"uniqueness {self.uniqueness} must lie in [0, 1)")
+        if self.uniqueness and self.vote_temperature is None:
+            raise ValueError(f"uniqueness {self.uniqueness} needs a vote_temperature, such as 0.05")
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import torch
@@ -14,12 +14,14 @@ from hybridreg.learned.backbone import KpconvFpn
 from hybridreg.learned.batch import Batch
 from hybridreg.learned.blocks import pad_row
 from hybridreg.learned.config import NetworkConfig, OmpConfig
+from hybridreg.learned.consistency import consistent
 from hybridreg.learned.geotransformer import GeoTransformerBlock
 from hybridreg.learned.image_encoder import ImageEncoder, ImageFeatures
 from hybridreg.learned.omp import OverlapLogits, OverlapPredictor
 from hybridreg.learned.patch_pairs import PatchPairs, pair_patches, size_chunks
 from hybridreg.learned.patches import Patches, build_patches
 from hybridreg.learned.point_matching import PointMatches, gather_matches
+from hybridreg.learned.point_similarity import PointSimilarity, Voters, compare_points
 from hybridreg.learned.pyramid import Pyramid
 from hybridreg.learned.sinkhorn import OptimalTransport
 from hybridreg.learned.superpoint_mask import Kept, choose
@@ -93,8 +95,7 @@ class RegistrationNetwork(nn.Module):
         overlap = self.predict_overlap(encoding)
         kept = self.keep(encoding, overlap)
         features = self.attend(encoding, kept)
-        superpoints = self.match_superpoints(encoding, kept, features)
-        matches = self.match_points(encoding, superpoints)
+        superpoints, matches = self.match(encoding, kept, features)
         return Output(
             encoding=encoding,
             overlap=overlap,
@@ -164,8 +165,29 @@ class RegistrationNetwork(nn.Module):
         target, source = self.transformer(features[0], features[1], points[0], points[1])
         return F.normalize(target, dim=1), F.normalize(source, dim=1)
 
-    def match_superpoints(
+    def match(
         self, encoding: Encoding, kept: tuple[Kept, Kept], features: tuple[Tensor, Tensor]
+    ) -> tuple[SuperpointMatches, PointMatches]:
+        """Superpoint and point matches of the kept superpoints with their attended features."""
+        similarity = self.compare_points(encoding, kept)
+        superpoints = self.match_superpoints(encoding, kept, features, similarity)
+        return superpoints, self.match_points(encoding, superpoints, similarity)
+
+    def compare_points(self, encoding: Encoding, kept: tuple[Kept, Kept]) -> PointSimilarity | None:
+        """The fine points of the kept superpoints held against each other; None where that is not wanted."""
+        temperature = self.config.matching.vote_temperature
+        if temperature is None:
+            return None
+        clouds = zip((encoding.target, encoding.source), kept, strict=True)
+        target, source = (_voters(cloud, keep) for cloud, keep in clouds)
+        return compare_points(target, source, temperature)
+
+    def match_superpoints(
+        self,
+        encoding: Encoding,
+        kept: tuple[Kept, Kept],
+        features: tuple[Tensor, Tensor],
+        similarity: PointSimilarity | None = None,
     ) -> SuperpointMatches:
         """Pairs of kept superpoints that own fine points, best first, as indices into all superpoints."""
         target = _owning(encoding.target.patches, kept[0])
@@ -177,6 +199,7 @@ class RegistrationNetwork(nn.Module):
             config.superpoint_matches,
             dual=config.dual_normalization,
             temperature=config.temperature,
+            votes=None if similarity is None else similarity.votes[target][:, source],
         )
         target_index, source_index = kept[0].index[target][found.target], kept[1].index[source][found.source]
         return SuperpointMatches(target_index, source_index, found.score)
@@ -200,12 +223,27 @@ class RegistrationNetwork(nn.Module):
         scores = torch.bmm(target, source.transpose(1, 2)) / scale
         return self.transport(scores, pairs.target_mask, pairs.source_mask, form, iterations)
 
-    def match_points(self, encoding: Encoding, superpoints: SuperpointMatches) -> PointMatches:
-        """Point correspondences of the matched superpoints' patches."""
+    def match_points(
+        self, encoding: Encoding, superpoints: SuperpointMatches, similarity: PointSimilarity | None = None
+    ) -> PointMatches:
+        """Point correspondences of the matched superpoints' patches, those that are unique and move as one."""
         config = self.config.matching
         chunks = size_chunks(self.pair_up(encoding, superpoints.target, superpoints.source))
         blocks = [(chunk, self.assign(encoding, chunk, config.sinkhorn_form)) for chunk in chunks]
-        return gather_matches(blocks, encoding.target.points, encoding.source.points, config)
+        matches = gather_matches(blocks, encoding.target.points, encoding.source.points, config)
+        if similarity is not None:
+            unique = similarity.uniqueness(matches.target_index, matches.source_index)
+            matches = replace(matches, weight=matches.weight * unique).only(unique > config.uniqueness)
+        if config.consistency is not None:
+            found = (matches.target, matches.source, matches.weight)
+            matches = matches.only(consistent(*found, config.consistency))
+        return matches
+
+
+def _voters(cloud: CloudEncoding, kept: Kept) -> Voters:
+    place = torch.full((len(cloud.nodes),), -1, dtype=torch.int64, device=cloud.nodes.device)
+    place[kept.index] = torch.arange(len(kept.index), device=place.device)
+    return Voters(cloud.point_features, place[cloud.patches.owner], len(kept.index))
 
 
 def _owning(patches: Patches, kept: Kept) -> Tensor:

@@ -26,6 +26,12 @@ class PointMatches:
     def __len__(self) -> int:
         return len(self.weight)
 
+    def only(self, chosen: Tensor) -> PointMatches:
+        """Those of a mask (C,), or all where it leaves none."""
+        if not bool(chosen.any()):
+            return self
+        return PointMatches(*(getattr(self, name)[chosen] for name in PointMatches.__dataclass_fields__))
+
 
 def mutual_top_k(
     probability: Tensor, rows: Tensor, columns: Tensor, *, topk: int, threshold: float, mutual: bool = True

@@ -46,7 +46,7 @@ class NetworkMatcher(NetworkStage):
         with torch.inference_mode():
             kept = keep(scene, overlap, encoding, network.config, self.min_overlap)
             features = network.attend(encoding, kept)
-            matches = network.match_points(encoding, network.match_superpoints(encoding, kept, features))
+            _, matches = network.match(encoding, kept, features)
         return _correspondences(matches, network)
 
 

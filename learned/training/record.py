@@ -152,8 +152,7 @@ class Record:
 def _ratios(network: RegistrationNetwork, outcome: Outcome, sample: Sample) -> dict[str, float]:
     matched = outcome.matched
     assert matched is not None
-    superpoints = network.match_superpoints(matched.encoding, matched.kept, matched.features)
-    matches = network.match_points(matched.encoding, superpoints)
+    superpoints, matches = network.match(matched.encoding, matched.kept, matched.features)
     T = sample.targets.transform.to(matches.source.device)
     right = (apply_transform(matches.source, T) - matches.target).norm(dim=1) < PROTOCOL.inlier_m
     return {
