@@ -64,7 +64,8 @@ def compare_points(target: Voters, source: Voters, temperature: float) -> PointS
     features = [F.normalize(voters.features, dim=1) / temperature**0.5 for voters in (target, source)]
     f, g = features[0][at_target], features[1][at_source]
     owner_f, owner_g = target.owner[at_target], source.owner[at_source]
-    best_f = f.new_full((source.size, len(f)), -torch.inf)  # of each target point within each source patch
+    lowest, least = torch.finfo(f.dtype).min, torch.finfo(f.dtype).tiny
+    best_f = f.new_full((source.size, len(f)), lowest)  # of each target point within each source patch
     total_f, total_g, given_g = f.new_zeros(len(f)), [], f.new_zeros(source.size, target.size)
     # Scores are at most 1 / temperature: subtracted, no exponential overflows.
     highest = 1.0 / temperature
@@ -72,7 +73,7 @@ def compare_points(target: Voters, source: Voters, temperature: float) -> PointS
         scores = g[block] @ f.t()
         row = owner_g[block][:, None].expand_as(scores)
         best_f.scatter_reduce_(0, row, scores, "amax")
-        best_g = scores.new_full((len(block), target.size), -torch.inf)
+        best_g = scores.new_full((len(block), target.size), lowest)
         best_g.scatter_reduce_(1, owner_f[None].expand_as(scores), scores, "amax")
         given_g.index_add_(0, owner_g[block], torch.softmax(best_g, 1))
         scores.sub_(highest).exp_()
@@ -84,7 +85,9 @@ def compare_points(target: Voters, source: Voters, temperature: float) -> PointS
     totals = (total_f, torch.cat(total_g) if total_g else g.new_zeros(0))
     places = ((target, at_target), (source, at_source))
     spread = [
-        voters.features.new_full((len(voters.features),), torch.inf).index_copy_(0, at, total.log() + highest)
+        voters.features.new_full((len(voters.features),), torch.inf).index_copy_(
+            0, at, total.clamp_min(least).log() + highest
+        )
         for (voters, at), total in zip(places, totals, strict=True)
     ]
     return PointSimilarity(votes, features[0], features[1], spread[0], spread[1])

@@ -252,3 +252,36 @@ def test_image_encoder_strides_and_dropout(nano: NetworkConfig, stride: int) -> 
     assert grid is not None
     assert grid.shape == (config.dim, config.height // stride, config.width // stride)
     assert encoder.train()(image).grid is None
+
+
+@pytest.mark.parametrize(
+    ("changes", "told"),
+    [
+        ({"vote_temperature": 0.0}, "vote_temperature 0.0 must be above 0"),
+        ({"consistency": -1.0}, "consistency -1.0 must be above 0"),
+        ({"uniqueness": 1.0, "vote_temperature": 0.1}, "uniqueness 1.0 must lie in"),
+        ({"uniqueness": 0.1}, "uniqueness 0.1 needs a vote_temperature"),
+    ],
+)
+def test_matching_that_cannot_be_is_refused(changes: dict[str, float], told: str) -> None:
+    with pytest.raises(ValueError, match=told):
+        MatchingConfig(**changes)
+
+
+def test_votes_and_filters_only_leave_matches_out(network: RegistrationNetwork, batch: Batch) -> None:
+    plain = network.config
+    matching = replace(plain.matching, vote_temperature=0.05, consistency=5.0)
+    strict = replace(matching, uniqueness=0.02)
+    found = []
+    try:
+        for config in (matching, strict):
+            network.config = replace(plain, matching=config)
+            with torch.no_grad():
+                found.append(network(batch))
+    finally:
+        network.config = plain
+    loose, tight = found
+    assert len(loose.superpoints) == len(tight.superpoints) > 0
+    assert float(loose.superpoints.score.max()) == 1.0
+    assert 0 < len(tight.matches) <= len(loose.matches)
+    assert bool((tight.matches.weight <= 1.0).all())
