@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from hybridreg import limits
 from hybridreg.classical.voxel import voxel_centroids
 from hybridreg.matches import Correspondences, Pose
 from hybridreg.resources import n_threads
@@ -50,6 +51,7 @@ class KissMatcher(Stage):
             value = getattr(self, name)
             if value is not None and not 0.0 < value < np.inf:
                 raise ValueError(f"{name}={value} must be a positive number")
+        limits.at_least(self, _FEWEST_MATCHES, "max_matches")
 
     def __call__(self, scene: Scene, matches: Correspondences, rng: np.random.Generator) -> Pose:
         voxel = self.voxel or self.scale * scene.spacing

@@ -101,9 +101,12 @@ def check(T: Any, name: str = "T", tolerance: float = 1e-4) -> Array:
     Raises
     ------
     ValueError
-        Wrong shape, not finite, last row not (0, 0, 0, 1), or a rotation off by more than `tolerance`.
+        No numbers, wrong shape, not finite, last row not (0, 0, 0, 1), or a rotation off by more than `tolerance`.
     """
-    matrix = np.asarray(T, dtype=np.float64)
+    try:
+        matrix = np.asarray(T, dtype=np.float64)
+    except (TypeError, ValueError, OverflowError) as error:
+        raise ValueError(f"{name}: expected numbers of shape (4, 4) ({error})") from error
     if matrix.shape != (4, 4):
         raise ValueError(f"{name}: expected shape (4, 4), got {matrix.shape}")
     if not np.isfinite(matrix).all():

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
-from hybridreg.learned.plain_values import build
+from hybridreg.plain_values import build
 
 DEFAULT_NEIGHBOR_LIMITS = (65, 80, 60, 60, 65)
 

@@ -14,6 +14,7 @@ from safetensors.torch import load_file, save
 from torch import Tensor, nn
 
 from hybridreg.io.atomic import write_bytes, write_text
+from hybridreg.io.structured import read_json
 from hybridreg.learned.config import NetworkConfig
 from hybridreg.learned.network import RegistrationNetwork
 from hybridreg.learned.official_names import official_name
@@ -44,8 +45,8 @@ def from_pretrained(name_or_folder: str | os.PathLike[str]) -> RegistrationNetwo
     """
     folder = _find(name_or_folder)
     try:
-        config = NetworkConfig.from_dict(json.loads((folder / CONFIG_FILE).read_text(encoding="utf-8")))
-    except (json.JSONDecodeError, UnicodeDecodeError, TypeError) as error:
+        config = NetworkConfig.from_dict(read_json(folder / CONFIG_FILE))
+    except (ValueError, TypeError, ArithmeticError) as error:
         raise ValueError(f"{folder / CONFIG_FILE} is damaged: {error}") from error
     try:
         tensors = load_file(folder / WEIGHTS_FILE)

@@ -132,7 +132,12 @@ def _network() -> Pipeline:
     )
 
 
-_SAMPLES = tuple(
-    f"a {suffix} {kind}" for suffix in ("png", "jpg", "bmp", "tiff", "webp", "pgm", "ppm") for kind in ("grey", "colour")
-    if not (suffix == "pgm" and kind == "colour") and not (suffix == "ppm" and kind == "grey")
-)  # fmt: skip
+_SAMPLES = (
+    *(
+        f"a {suffix} {kind}"
+        for suffix in ("png", "jpg", "bmp", "tiff", "webp")
+        for kind in ("grey", "colour")
+    ),
+    "a pgm grey",
+    "a ppm colour",
+)

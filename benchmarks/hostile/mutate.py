@@ -15,8 +15,9 @@ Change = tuple[Any, ...]
 _ODD: tuple[Any, ...] = (
     -1, 0, 1, 2, 3, 7, 2**31, 2**63 - 1, -0.5, 0.3, 1.0, 1e-300, 1e300, float("nan"), float("inf"), True, False,
     "", "none", "omp", "fpfh", "os:system", "hybridreg.classical.voxel:VoxelGrid", "estimate.kiss", "../..",
-    "\x00", "é" * 50, [], {}, [[]], [1, "a", {}], [0.5, 0.25], [-1.0], {"stage": "none"}, {"stage": "estimate.candidates"},
-    {"stage": 3}, {"stage": "voxel", "voxel": "a"}, {"estimate": "kiss"}, datetime.date(2024, 2, 29),
+    "\x00", "é" * 50, [], {}, [[]], [1, "a", {}], [0.5, 0.25], [-1.0], {"stage": "none"},
+    {"stage": "estimate.candidates"},    {"stage": 3}, {"stage": "voxel", "voxel": "a"}, {"estimate": "kiss"},
+    datetime.date(2024, 2, 29),
 )  # fmt: skip
 _WORDS = (
     "voxel",

@@ -133,6 +133,6 @@ def _dump(content: Any) -> str:
 
 _USES: dict[str, Callable[[Path], str]] = {FILES[0]: _predictions, FILES[1]: _index, FILES[2]: _meta}
 _NOISE = (
-    "[" * 100_000, '{"a":' * 100_000, "9" * 5000, "null", "[]", "3", '"text"', "{}", "", "\x00" * 64, "\u2028", "{" * 10,
-    '{"format": "hybridreg predictions 1"}', '{"format": "hybridreg predictions 1", "config": 3}',
+    "[" * 100_000, '{"a":' * 100_000, "9" * 5000, "null", "[]", "3", '"text"', "{}", "", "\x00" * 64, "\u2028",
+    "{" * 10,    '{"format": "hybridreg predictions 1"}', '{"format": "hybridreg predictions 1", "config": 3}',
 )  # fmt: skip
