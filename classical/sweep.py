@@ -17,6 +17,8 @@ Floats = NDArray[np.float32]
 
 # Yaws transformed at once, and the sectors in which a place keeps a best yaw of its own (a street turned round).
 _BATCH, _SECTORS = 4, 4
+# Cells along a map; the memory goes with their square. Clouds about their origin need some hundreds.
+_LONGEST = 2048
 
 
 class Planar(NamedTuple):
@@ -51,10 +53,21 @@ def sweep(
         Peaks returned, at most.
     share : float
         Of the best one's score that a peak needs.
+
+    Raises
+    ------
+    ValueError
+        The clouds reach so far from the axis that they turn about that their maps would not fit in memory.
     """
     from scipy import fft
 
-    n = fft.next_fast_len(int(np.ceil((_extent(source) + _extent(target) + 2.0 * cell) / cell)), real=True)
+    across = _extent(source) + _extent(target) + 2.0 * cell
+    if across > _LONGEST * cell:
+        raise ValueError(
+            f"bird's-eye search: the clouds reach {0.5 * across:.3g} m from their origins, {across / cell:.3g} cells of "
+            f"{cell:.3g} m across; move each cloud's sensor to its origin"
+        )
+    n = fft.next_fast_len(int(np.ceil(across / cell)), real=True)
     place: Array = cell * np.fft.fftfreq(n, 1.0 / n).astype(np.float64)
     beyond = np.hypot(place[:, None], place) > farthest
     spectrum = fft.rfft2(blurred(signed(target, 1.0, n, cell)), workers=n_threads())

@@ -22,6 +22,21 @@ def positive(stage: Any, *names: str) -> None:
             raise ValueError(f"{name}={value} must be positive and finite")
 
 
+def within(stage: Any, low: float, high: float, *names: str) -> None:
+    """Each named field, or each item of one that is a list, must lie in `low` to `high`.
+
+    Raises
+    ------
+    ValueError
+        Naming the field and its value.
+    """
+    for name in names:
+        value = getattr(stage, name)
+        items = value if isinstance(value, (tuple, list)) else (value,)
+        if not all(low <= item <= high for item in items):
+            raise ValueError(f"{name}={value} must lie in {low:g} to {high:g}")
+
+
 def at_least(stage: Any, low: int, *names: str) -> None:
     """Each named field must be `low` or more.
 

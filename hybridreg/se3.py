@@ -115,8 +115,9 @@ def check(T: Any, name: str = "T", tolerance: float = 1e-4) -> Array:
         raise ValueError(
             f"{name}: the last row is {matrix[3]}, expected [0 0 0 1]; is the matrix transposed?"
         )
-    error = float(np.abs(matrix[:3, :3] @ matrix[:3, :3].T - np.eye(3)).max())
-    if error > tolerance or np.linalg.det(matrix[:3, :3]) < 0:
+    with np.errstate(over="ignore", invalid="ignore"):
+        error = float(np.abs(matrix[:3, :3] @ matrix[:3, :3].T - np.eye(3)).max())
+    if not error <= tolerance or np.linalg.det(matrix[:3, :3]) < 0:
         raise ValueError(
             f"{name}: the upper left 3x3 block is no rotation (R R^T is off by {error:.2g}, "
             f"determinant {np.linalg.det(matrix[:3, :3]):.3g}); remove scale or reflection"

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -52,9 +53,14 @@ class Report:
         if outcome.word == "finding":
             self.findings.append((name, case, outcome.text))
         elif outcome.word == "refused":
-            self.messages.setdefault(outcome.text[:60], outcome.text)
+            self.messages.setdefault(_sort_of(outcome.text), outcome.text)
         self.slowest.append((outcome.seconds, name, case))
         self.slowest = sorted(self.slowest, key=lambda each: -each[0])[:5]
+
+
+def _sort_of(message: str) -> str:
+    # Without folders, numbers and what is quoted.
+    return re.sub(r"/\S*/|'[^']*'|\"[^\"]*\"|[\d.]+", "", message)[:60]
 
 
 def run(

@@ -87,7 +87,9 @@ class ArrayCase:
             result = register(source, target, voxel=self.voxel, nonfinite=self.nonfinite, seed=self.seed)
         else:
             pair = Pair.of(source, target, nonfinite=self.nonfinite)
-            result = Pipeline(voxel=self.voxel, **self.pipeline).run(pair, seed=self.seed)
+            gridded = self.pipeline.get("downsample") is None  # other stages have no voxel
+            voxel = self.voxel if gridded else None
+            result = Pipeline(voxel=voxel, **self.pipeline).run(pair, seed=self.seed)
         check(result)
         return result.verdict
 

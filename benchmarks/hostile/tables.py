@@ -24,8 +24,8 @@ if sys.version_info >= (3, 11):
 else:
     import tomli as tomllib
 
-# What a pipeline asks for beyond this is not run: ten million iterations take long because they were ordered.
-_MOST_ASKED = 100_000
+# What a pipeline asks for beyond this is not run: a million iterations take long because they were ordered.
+_MOST_ASKED = 10_000
 _NOISE = (
     "x = " + "[" * 3000, "a." * 3000 + "b = 1", "x = " + "9" * 5000, "[[row]]\n" * 3000, "\ufeffvoxel = 1",
     "voxel = 0.3\nvoxel = 0.4", "voxel = 1979-05-27", "= 1", "voxel = 0x" + "f" * 400, "",
