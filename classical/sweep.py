@@ -17,8 +17,8 @@ Floats = NDArray[np.float32]
 
 # Yaws transformed at once, and the sectors in which a place keeps a best yaw of its own (a street turned round).
 _BATCH, _SECTORS = 4, 4
-# Cells along a map; the memory goes with their square. Clouds about their origin need some hundreds.
-_LONGEST = 2048
+# Cells along a map; time and memory go with their square. Clouds with their sensor at the origin need about 200.
+_LONGEST = 512
 
 
 class Planar(NamedTuple):
@@ -64,8 +64,8 @@ def sweep(
     across = _extent(source) + _extent(target) + 2.0 * cell
     if across > _LONGEST * cell:
         raise ValueError(
-            f"bird's-eye search: the clouds reach {0.5 * across:.3g} m from their origins, {across / cell:.3g} cells of "
-            f"{cell:.3g} m across; move each cloud's sensor to its origin"
+            f"bird's-eye search: maps about the clouds' origins have {across / cell:.3g} cells of {cell:.3g} m along a "
+            f"side, more than {_LONGEST}; move each cloud's sensor, or its middle, to its origin"
         )
     n = fft.next_fast_len(int(np.ceil(across / cell)), real=True)
     place: Array = cell * np.fft.fftfreq(n, 1.0 / n).astype(np.float64)

@@ -117,9 +117,10 @@ def check(T: Any, name: str = "T", tolerance: float = 1e-4) -> Array:
         )
     with np.errstate(over="ignore", invalid="ignore"):
         error = float(np.abs(matrix[:3, :3] @ matrix[:3, :3].T - np.eye(3)).max())
-    if not error <= tolerance or np.linalg.det(matrix[:3, :3]) < 0:
+        determinant = float(np.linalg.det(matrix[:3, :3]))
+    if not error <= tolerance or determinant < 0:
         raise ValueError(
             f"{name}: the upper left 3x3 block is no rotation (R R^T is off by {error:.2g}, "
-            f"determinant {np.linalg.det(matrix[:3, :3]):.3g}); remove scale or reflection"
+            f"determinant {determinant:.3g}); remove scale or reflection"
         )
     return matrix

@@ -71,7 +71,7 @@ def run(
     limit: float = 30.0,
     on_case: Callable[[str, Case, Outcome], None] | None = None,
 ) -> Report:
-    """Try about `n` inputs, the same ones for the same `start`.
+    """Try `n` inputs or a few more, the same ones for the same `start`.
 
     Parameters
     ----------
@@ -82,7 +82,7 @@ def run(
     with Watched(limit) as watched:
         for name, (share, strategy) in SHARES.items():
             if not kinds or name in kinds:
-                wanted = n if kinds else max(1, round(n * share / 100))
+                wanted = n if kinds else -(-n * share // 100)
                 for case in draw(strategy(), wanted, start):
                     outcome = watched.run(case)
                     report.add(name, case, outcome)

@@ -9,8 +9,12 @@ from traceback import extract_tb
 from typing import ClassVar, Protocol
 
 import hybridreg
+import hybridreg.classical
+import hybridreg.eval
+import hybridreg.learned
 
-ROOTS = tuple(str(Path(folder).resolve()) for folder in hybridreg.__path__)
+_PACKAGES = (hybridreg, hybridreg.classical, hybridreg.eval, hybridreg.learned)
+ROOTS = tuple(str(Path(str(package.__file__)).resolve().parent) for package in _PACKAGES)
 
 
 class Case(Protocol):

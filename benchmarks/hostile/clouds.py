@@ -11,7 +11,7 @@ import numpy as np
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from benchmarks.hostile.containers import CONTAINERS, contain
+from benchmarks.hostile.containers import CONTAINERS, TAKEN, contain
 from benchmarks.hostile.shapes import SHAPES, SPOILS, shape, spoil
 from hybridreg import Pipeline, register, se3
 from hybridreg.pair import Pair
@@ -136,7 +136,8 @@ _ODDITIES: tuple[st.SearchStrategy[tuple[str, Any]], ...] = tuple(
         ("offset", OFFSETS),
         ("spoils", tuple((name,) for name in SPOILS)),
         ("container", CONTAINERS),
-        ("container", CONTAINERS),
+        ("container", TAKEN),
+        ("container", TAKEN),
     )
 )
 

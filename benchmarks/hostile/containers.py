@@ -135,3 +135,6 @@ _MAKE: dict[str, Callable[[Array], Any]] = {
 }  # fmt: skip
 
 CONTAINERS = tuple(_MAKE)
+TAKEN = ("float32", "float16", "big endian", "list", "fortran", "strided", "reversed", "read-only", "four columns",
+         "masked", "namespace", "torch float", "torch bfloat16", "open3d", "open3d tensor")  # fmt: skip
+"""Those that hold points which the library reads."""
