@@ -22,7 +22,7 @@ def main() -> None:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--kills", type=int, default=20)
-    parser.add_argument("--pairs", type=int, default=12)
+    parser.add_argument("--pairs", type=int, default=20)
     parser.add_argument("--workers", type=int, nargs="*", default=[1, 2])
     parser.add_argument("--seed", type=int, default=0)
     options = parser.parse_args()
@@ -35,7 +35,7 @@ def main() -> None:
             killed.write_data(root / "data", options.pairs)
             seconds = killed.run_whole(root, "whole", workers)
             story = killed.run_killed(
-                root, "killed", kills=options.kills, seconds=0.8 * seconds, workers=workers, seed=options.seed
+                root, "killed", kills=options.kills, whole="whole", workers=workers, seed=options.seed
             )
             killed.same_tables(root, "whole", "killed")
         print(

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import csv
 import json
 import os
 import signal
@@ -34,8 +35,8 @@ refine = "icp"
 [[row]]
 name = "default"
 """
-# Columns of the CSV that tell times and memory, which no two runs share.
-_UNSHARED = ("s a pair", "peak MB")
+# Columns of the CSV that tell times and memory, which no two runs share, begin with these.
+_UNSHARED = ("seconds", "peak_memory")
 _LONGEST_SECONDS = 600.0
 
 
@@ -46,12 +47,10 @@ class Story:
     Attributes
     ----------
     kills : how often the batch was killed
-    kept : rows that a kill found finished, summed over the kills
     began : rows that each start found
     """
 
     kills: int = 0
-    kept: int = 0
     began: list[int] = field(default_factory=list)
 
 
@@ -75,10 +74,16 @@ def run_whole(root: Path, out: str, workers: int) -> float:
     return time.perf_counter() - start
 
 
-def run_killed(root: Path, out: str, *, kills: int, seconds: float, workers: int, seed: int) -> Story:
-    """The batch, killed (SIGKILL) at up to `kills` seeded moments of `seconds`, then run to its end.
+def run_killed(root: Path, out: str, *, kills: int, whole: str, workers: int, seed: int) -> Story:
+    """The batch, killed (SIGKILL) at `kills` seeded moments, then run to its end.
 
+    A moment is told by rows and not by the clock, so that a busy machine does not move all of them into the imports:
+    after so many new rows, and a part of a row's time more. With no row left it falls into the writing of the reports.
     After every kill each row that the file held whole before must stand in it unchanged, byte by byte.
+
+    Parameters
+    ----------
+    whole : the folder of the undisturbed run
 
     Raises
     ------
@@ -86,10 +91,13 @@ def run_killed(root: Path, out: str, *, kills: int, seconds: float, workers: int
         A row was lost, changed or doubled.
     """
     rng, story = np.random.default_rng(seed), Story()
+    total, row_seconds = _rows_of(root / whole)
     folder = root / out / "predictions"
     before: dict[str, list[bytes]] = {}
-    for _ in range(kills):
-        story.began.append(sum(len(lines) for lines in before.values()))
+    while story.kills < kills:
+        had = _count(before)
+        story.began.append(had)
+        ahead = min(int(rng.integers(0, 2 * total // kills + 2)), total - had)
         process = subprocess.Popen(
             _command(out, workers),
             cwd=root,
@@ -97,15 +105,28 @@ def run_killed(root: Path, out: str, *, kills: int, seconds: float, workers: int
             stderr=subprocess.DEVNULL,
             start_new_session=True,
         )
-        if _killed_after(process, float(rng.uniform(0.0, seconds))):
-            story.kills += 1
+        _wait_for_rows(process, folder, had + ahead)
+        story.kills += _killed_after(process, float(rng.uniform(0.0, 2.0 * row_seconds)))
         after = whole_lines(folder)
         compare(before, after)
-        story.kept += sum(len(lines) for lines in after.values())
         before = after
     run_whole(root, out, workers)
     compare(before, whole_lines(folder))
     return story
+
+
+def _rows_of(folder: Path) -> tuple[int, float]:
+    rows = [row for file in (folder / "predictions").glob("*.jsonl") for row in store.read(file).rows]
+    return len(rows), float(np.mean([row.seconds["total"] for row in rows]))
+
+
+def _count(lines: dict[str, list[bytes]]) -> int:
+    return sum(len(each) - 1 for each in lines.values() if each)
+
+
+def _wait_for_rows(process: subprocess.Popen[bytes], folder: Path, rows: int) -> None:
+    while process.poll() is None and _count(whole_lines(folder)) < rows:
+        time.sleep(0.01)
 
 
 def whole_lines(folder: Path) -> dict[str, list[bytes]]:
@@ -138,13 +159,9 @@ def same_tables(root: Path, one: str, other: str) -> None:
 
 
 def _figures(path: Path) -> list[dict[str, Any]]:
-    import csv
-
     with path.open(encoding="utf-8", newline="") as file:
-        return [
-            {key: value for key, value in line.items() if key not in _UNSHARED}
-            for line in csv.DictReader(file)
-        ]
+        lines = list(csv.DictReader(file))
+    return [{key: text for key, text in line.items() if not key.startswith(_UNSHARED)} for line in lines]
 
 
 def _command(out: str, workers: int) -> Sequence[str]:
