@@ -10,6 +10,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from hybridreg import limits
 from hybridreg.classical.voxel import voxel_centroids
 from hybridreg.fitness import measure
 from hybridreg.matches import Pose
@@ -21,6 +22,7 @@ from hybridreg.stage import Stage
 Array = NDArray[np.float64]
 Side = Literal["source", "target"]
 
+_FEWEST_NEIGHBOURS = 3  # span a plane
 # Steps at which a round ends, and how many times larger they may be in the rounds before the last.
 _STILL_RAD, _STILL_M, _COARSE = 1e-5, 1e-4, 100.0
 
@@ -45,6 +47,11 @@ class Gicp(Stage):
     max_distances: tuple[float, ...] | None = None
     neighbours: int = 20
     iterations: int = 30
+
+    def __post_init__(self) -> None:
+        limits.positive(self, "voxel", "max_distances")
+        limits.at_least(self, _FEWEST_NEIGHBOURS, "neighbours")
+        limits.at_least(self, 1, "iterations")
 
     def __call__(self, scene: Scene, pose: Pose) -> Pose:
         import small_gicp

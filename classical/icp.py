@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from hybridreg import se3
+from hybridreg import limits, se3
 from hybridreg.matches import Pose
 from hybridreg.normals import surface, tree
 from hybridreg.resources import n_threads
@@ -43,6 +43,8 @@ class Icp(Stage):
     def __post_init__(self) -> None:
         if self.kind not in ("point", "plane"):
             raise ValueError(f"kind={self.kind!r} must be 'point' or 'plane'")
+        limits.positive(self, "max_distances")
+        limits.at_least(self, 1, "iterations")
 
     def __call__(self, scene: Scene, pose: Pose) -> Pose:
         T = pose.T

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from hybridreg import limits
 from hybridreg.classical.voxel import voxel_centroids
 from hybridreg.matches import Correspondences, Pose
 from hybridreg.resources import n_threads
@@ -21,6 +22,7 @@ Array = NDArray[np.float64]
 # 225 crashes had no point with five neighbours within the radius of its normals; twice as much is asked for here.
 _SUPPORTED_POINTS, _NEIGHBOURS, _NORMAL_RADIUS = 10, 6, 3.0
 _FEWEST_MATCHES = 3
+_SMALLEST_VOXEL = 0.005  # below it the wheel raises RuntimeError
 _LARGEST_NOISE = 0.999
 
 
@@ -39,6 +41,11 @@ class KissMatcher(Stage):
         Voxel in spacings of the levels.
     max_matches : int
         KISS-Matcher keeps at most so many initial matches.
+
+    Raises
+    ------
+    ValueError
+        When called: a voxel below 5 mm, which KISS-Matcher does not take.
     """
 
     voxel: float | None = None
@@ -50,6 +57,7 @@ class KissMatcher(Stage):
             value = getattr(self, name)
             if value is not None and not 0.0 < value < np.inf:
                 raise ValueError(f"{name}={value} must be a positive number")
+        limits.at_least(self, _FEWEST_MATCHES, "max_matches")
 
     def __call__(self, scene: Scene, matches: Correspondences, rng: np.random.Generator) -> Pose:
         voxel = self.voxel or self.scale * scene.spacing
@@ -70,6 +78,11 @@ class KissMatcher(Stage):
         target = voxel_centroids(scene.pair.target.points, voxel)
         if not (_describable(source, voxel) and _describable(target, voxel)):
             return None
+        if voxel < _SMALLEST_VOXEL:
+            raise ValueError(
+                f"KISS-Matcher works on voxels of {_SMALLEST_VOXEL} m and more, not of {voxel:.3g} m; give a larger "
+                "`voxel`, or the coordinates in another unit"
+            )
         # It clamps both noise bounds at a metre, and prints a warning where it does; so clamp before.
         config = kiss_matcher.KISSMatcherConfig(
             voxel,

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from hybridreg import limits
 from hybridreg.classical.gicp import not_worse
 from hybridreg.classical.voxel import voxel_centroids
 from hybridreg.matches import Pose
@@ -36,6 +37,10 @@ class KissIcp(Stage):
     sigma: float | None = None
     voxel: float | None = None
     iterations: int = 500
+
+    def __post_init__(self) -> None:
+        limits.positive(self, "sigma", "voxel")
+        limits.at_least(self, 1, "iterations")
 
     def __call__(self, scene: Scene, pose: Pose) -> Pose:
         from kiss_icp.mapping import VoxelHashMap

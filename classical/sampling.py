@@ -10,7 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from hybridreg import limits
 from hybridreg.cloud import PointCloud
+from hybridreg.gate import MIN_POINTS
 from hybridreg.pair import Pair
 from hybridreg.resources import n_threads
 from hybridreg.scene import Level, Scene
@@ -33,6 +35,10 @@ class RandomSample(Stage):
 
     n_points: int = 10_000
     seed: int = 0
+
+    def __post_init__(self) -> None:
+        limits.at_least(self, MIN_POINTS, "n_points")
+        limits.at_least(self, 0, "seed")
 
     def __call__(self, pair: Pair) -> Scene:
         rng = np.random.default_rng([self.seed, zlib.crc32(pair.id.encode())])

@@ -17,6 +17,8 @@ Floats = NDArray[np.float32]
 
 # Yaws transformed at once, and the sectors in which a place keeps a best yaw of its own (a street turned round).
 _BATCH, _SECTORS = 4, 4
+# Cells along a map; time and memory go with their square. Clouds with their sensor at the origin need about 200.
+_LONGEST = 512
 
 
 class Planar(NamedTuple):
@@ -51,10 +53,21 @@ def sweep(
         Peaks returned, at most.
     share : float
         Of the best one's score that a peak needs.
+
+    Raises
+    ------
+    ValueError
+        The clouds reach so far from the axis that they turn about that their maps would not fit in memory.
     """
     from scipy import fft
 
-    n = fft.next_fast_len(int(np.ceil((_extent(source) + _extent(target) + 2.0 * cell) / cell)), real=True)
+    across = _extent(source) + _extent(target) + 2.0 * cell
+    if across > _LONGEST * cell:
+        raise ValueError(
+            f"bird's-eye search: maps about the clouds' origins have {across / cell:.3g} cells of {cell:.3g} m along a "
+            f"side, more than {_LONGEST}; move each cloud's sensor, or its middle, to its origin"
+        )
+    n = fft.next_fast_len(int(np.ceil(across / cell)), real=True)
     place: Array = cell * np.fft.fftfreq(n, 1.0 / n).astype(np.float64)
     beyond = np.hypot(place[:, None], place) > farthest
     spectrum = fft.rfft2(blurred(signed(target, 1.0, n, cell)), workers=n_threads())

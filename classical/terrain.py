@@ -28,7 +28,7 @@ class Terrain:
 
     @classmethod
     def of(cls, points: Array, cell: float) -> Terrain:
-        """Smoothed lowest points of each cell of a levelled cloud (n, 3) whose ground plane is z = 0.
+        """Smoothed lowest points of each cell of a levelled cloud (n, 3) whose ground plane is z = 0; flat without any.
 
         Parameters
         ----------
@@ -37,6 +37,8 @@ class Terrain:
         """
         from scipy.ndimage import gaussian_filter
 
+        if len(points) == 0:
+            return cls(np.zeros((1, 1)), np.zeros(2), cell)
         reach = np.hypot(points[:, 0], points[:, 1])
         low = points[np.abs(points[:, 2]) < _NEAR + _SLOPE * reach]
         corner = points[:, :2].min(axis=0)

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Literal
 
@@ -87,7 +88,7 @@ def _cell_of(columns: Array, voxel: float) -> tuple[NDArray[np.int64], int]:
     # cell borders, where the last digit of a float decides.
     origin = columns.min(axis=1) - 1e-5 * voxel
     shape = np.floor((columns.max(axis=1) - origin) / voxel) + 1.0
-    if float(np.prod(shape)) > _MOST_CELLS:
+    if math.prod(shape.tolist()) > _MOST_CELLS:
         raise ValueError(
             f"a voxel of {voxel:.3g} m cuts the cloud into {' x '.join(f'{s:.3g}' for s in shape)} cells; "
             "choose a larger voxel or check the unit"

@@ -52,7 +52,9 @@ class Errors:
 
 def of(rows: Sequence[Row], step: Step = "refined") -> Errors:
     """Errors of rows, after refinement or of the estimate before it."""
-    measured = np.array([_errors(row, step) for row in rows], dtype=np.float64).reshape(-1, 4)
+    # A method may have returned numbers beyond any world: its errors are then infinite, or NaN, and no success.
+    with np.errstate(over="ignore", invalid="ignore"):
+        measured = np.array([_errors(row, step) for row in rows], dtype=np.float64).reshape(-1, 4)
     return Errors(measured[:, 0], measured[:, 1], measured[:, 2], measured[:, 3] > 0.0)
 
 

@@ -52,8 +52,8 @@ def filterable(lines: Sequence[Cells], *, success: str, text_from: str) -> str:
         "success": head.index(success),
         "text": head.index(text_from),
     }
-    # "</" would end the script element, whatever the JSON says.
-    stored = json.dumps(data).replace("</", "<\\/")
+    # "</" would end the script element, "<!--<script" would keep it open, whatever the JSON says.
+    stored = json.dumps(data).replace("<", "\\u003c")
     cells = "".join(f'<th data-key="{escape(key)}">{escape(key)}</th>' for key in head)
     return (
         '<p><input type="search" id="pairs-filter" placeholder="words to look for"> '

@@ -8,6 +8,7 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from hybridreg.eval.columns import Cells
+from hybridreg.plain_values import build
 
 _KEYS = {"source", "data", "columns", "rows"}
 
@@ -55,9 +56,10 @@ def parse(table: Mapping[str, Any]) -> Printed:
     """
     if set(table) != _KEYS:
         raise ValueError(f"paper: has the keys {', '.join(sorted(_KEYS))}; got {', '.join(sorted(table))}")
-    columns = tuple(table["columns"])
-    for name, values in table["rows"].items():
-        if len(values) != len(columns):
-            raise ValueError(f"paper: row {name!r} has {len(values)} numbers for {len(columns)} columns")
-    rows = {name: tuple(float(value) for value in values) for name, values in table["rows"].items()}
-    return Printed(source=table["source"], data=table["data"], columns=columns, rows=rows)
+    printed = build(Printed, table, "paper")
+    for name, values in printed.rows.items():
+        if len(values) != len(printed.columns):
+            raise ValueError(
+                f"paper: row {name!r} has {len(values)} numbers for {len(printed.columns)} columns"
+            )
+    return printed

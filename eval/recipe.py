@@ -6,9 +6,8 @@ from __future__ import annotations
 import itertools
 import os
 import re
-import sys
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, fields
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -19,17 +18,35 @@ from hybridreg.eval.attempt import Method
 from hybridreg.eval.controls import MARK, Control
 from hybridreg.eval.paper import Printed
 from hybridreg.eval.protocols import Protocol, protocol
+from hybridreg.io.structured import parse_toml, read_toml
 from hybridreg.pipeline import Pipeline
+from hybridreg.plain_values import build, value_of
 from hybridreg.shipped_weights import MissingWeights
 
-if sys.version_info >= (3, 11):
-    import tomllib
-else:
-    import tomli as tomllib
+Changes = Mapping[str, Any]
 
-_KEYS = {"title", "data", "protocols", "seed", "starts", "base", "row", "sweep", "paper"}
 # What makes a line a control: a pipeline that knows more, or sees less, than a method does.
 _CONTROLS = ("oracle", "image")
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Content:
+    """What a table file may hold."""
+
+    title: str = ""
+    data: str = ""
+    protocols: tuple[str, ...] = ("cross3dreg", "kitti")
+    seed: int = 0
+    starts: int = 0
+    base: Changes = field(default_factory=dict)
+    row: tuple[Changes, ...] = ()
+    sweep: Changes = field(default_factory=dict)
+    paper: Changes | None = None
+
+    def __post_init__(self) -> None:
+        for name in ("seed", "starts"):
+            if getattr(self, name) < 0:
+                raise ValueError(f"table.{name}: {getattr(self, name)} must be 0 or more")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -73,15 +90,15 @@ def read(path: str | os.PathLike[str]) -> Recipe:
     FileNotFoundError
         No such file.
     KeyError, ValueError
-        Not TOML, a key that means nothing, a name that nobody registered, two lines of one name.
+        Not TOML, a key that means nothing, a value of the wrong kind, a name that nobody registered, two lines of one
+        name.
     """
     # A checkout has a folder `classical` where the table of that name may be asked for.
-    shipped = os.fspath(path) in known() and not Path(path).is_file()
-    file = _shipped().joinpath(f"{os.fspath(path)}.toml") if shipped else Path(path)
-    try:
-        table = tomllib.loads(file.read_text(encoding="utf-8"))
-    except (UnicodeDecodeError, tomllib.TOMLDecodeError, IsADirectoryError) as error:
-        raise ValueError(f"{os.fspath(path)}: not a TOML file ({error})") from error
+    if os.fspath(path) in known() and not Path(path).is_file():
+        text = _shipped().joinpath(f"{os.fspath(path)}.toml").read_text(encoding="utf-8")
+        table = parse_toml(text, os.fspath(path))
+    else:
+        table = read_toml(path)
     try:
         return parse(table, title=Path(path).stem)
     except ValueError as error:
@@ -90,11 +107,12 @@ def read(path: str | os.PathLike[str]) -> Recipe:
 
 def parse(table: Mapping[str, Any], *, title: str = "table") -> Recipe:
     """Recipe of a table file's content."""
-    unknown = set(table) - _KEYS
+    keys = {each.name for each in fields(_Content)}
+    unknown = set(table) - keys
     if unknown:
-        raise ValueError(f"{', '.join(sorted(unknown))}: unknown; a table has {', '.join(sorted(_KEYS))}")
-    base = table.get("base", {})
-    lines = [*_rows(base, table.get("row", [])), *_grid(base, table.get("sweep", {}))]
+        raise ValueError(f"{', '.join(sorted(unknown))}: unknown; a table has {', '.join(sorted(keys))}")
+    content = build(_Content, table, "table")
+    lines = [*_rows(content.base, content.row), *_grid(content.base, content.sweep)]
     if not lines:
         raise ValueError("the table has no [[row]] and no [sweep]")
     names = [slug(line.name) for line in lines]
@@ -102,13 +120,13 @@ def parse(table: Mapping[str, Any], *, title: str = "table") -> Recipe:
     if double is not None:
         raise ValueError(f"two lines are called {double!r}; give each a name of its own")
     return Recipe(
-        title=table.get("title", title),
-        data=table.get("data", ""),
-        protocols=tuple(protocol(name) for name in table.get("protocols", ["cross3dreg", "kitti"])),
-        seed=table.get("seed", 0),
-        starts=table.get("starts", 0),
+        title=content.title or title,
+        data=content.data,
+        protocols=tuple(protocol(name) for name in content.protocols),
+        seed=content.seed,
+        starts=content.starts,
         lines=tuple(lines),
-        paper=paper.parse(table["paper"]) if "paper" in table else None,
+        paper=None if content.paper is None else paper.parse(content.paper),
     )
 
 
@@ -134,10 +152,11 @@ def _shipped() -> Any:
     return files("hybridreg.eval").joinpath("tables")
 
 
-def _rows(base: Mapping[str, Any], rows: list[dict[str, Any]]) -> Iterator[Line]:
+def _rows(base: Changes, rows: Sequence[Changes]) -> Iterator[Line]:
     for row in rows:
         changed = {key: value for key, value in row.items() if key != "name"}
-        name, merged = row.get("name") or title_of(changed), changes.merge(base, changed)
+        own = value_of(str, row.get("name", ""), "row.name")
+        name, merged = own or title_of(changed), changes.merge(base, changed)
         try:
             method = _build(merged)
         except MissingWeights as error:
@@ -147,7 +166,7 @@ def _rows(base: Mapping[str, Any], rows: list[dict[str, Any]]) -> Iterator[Line]
             yield Line(name=f"{name}{MARK}" if oracle else name, method=method)
 
 
-def _grid(base: Mapping[str, Any], sweep: Mapping[str, Any]) -> Iterator[Line]:
+def _grid(base: Changes, sweep: Changes) -> Iterator[Line]:
     # Every combination of the axes; one that does not fit stays in the table, with the reason.
     axes = dict(_axes(sweep))
     if not axes:
@@ -175,7 +194,7 @@ def _build(changed: Mapping[str, Any]) -> Pipeline | Control:
     return Control(pipeline=pipeline, oracle=bool(oracle), image=image)
 
 
-def _axes(sweep: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, list[Any]]]:
+def _axes(sweep: Changes, prefix: str = "") -> Iterator[tuple[str, list[Any]]]:
     for key, value in sweep.items():
         if isinstance(value, Mapping):
             yield from _axes(value, f"{prefix}{key}.")

@@ -19,6 +19,7 @@ from hybridreg.eval.table import Entry, Table
 from hybridreg.frames import lower_pose
 from hybridreg.pair import LabelledPair
 from hybridreg.pipeline import Pipeline, Trace
+from hybridreg.plain_values import value_of
 from hybridreg.slots import SLOTS
 
 
@@ -59,7 +60,11 @@ def _control(entry: Entry) -> Control | None:
     if not set(SLOTS) <= set(spec):
         return None
     pipeline = Pipeline(**{slot: spec[slot] for slot in SLOTS})
-    return Control(pipeline=pipeline, **spec.get("control", {}))
+    told = value_of(Mapping[str, bool], spec.get("control", {}), f"{entry.name}: control")
+    unknown = set(told) - {"oracle", "image"}
+    if unknown:
+        raise ValueError(f"{entry.name}: no control is called {', '.join(sorted(unknown))}")
+    return Control(pipeline=pipeline, **told)
 
 
 def _draw(

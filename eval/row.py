@@ -11,8 +11,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from hybridreg.io.structured import parse_json
+from hybridreg.plain_values import build
+
 Array = NDArray[np.float64]
 Matrix = list[list[float]]
+
+_MATRICES = ("T", "T_estimated", "T_true", "moments")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -77,12 +82,13 @@ class Row:
         Raises
         ------
         ValueError
-            The text is no row.
+            The text is no row, or a value is not of its field's type.
         """
-        try:
-            return cls(**json.loads(text))
-        except TypeError as error:
-            raise ValueError(f"not a row of predictions ({error})") from error
+        row = build(cls, parse_json(text, "not a row of predictions"), "not a row of predictions")
+        for name in _MATRICES:
+            if getattr(row, name) is not None and matrix(getattr(row, name)) is None:
+                raise ValueError(f"not a row of predictions: {name} is no finite 4x4 matrix")
+        return row
 
     @property
     def timeless(self) -> dict[str, Any]:

@@ -11,6 +11,8 @@ from pathlib import Path
 from typing import Any
 
 from hybridreg.eval.row import Row
+from hybridreg.io.structured import parse_json
+from hybridreg.plain_values import value_of
 
 _FORMAT = "hybridreg predictions 1"
 
@@ -137,10 +139,12 @@ def _refuse_foreign(path: Path) -> None:
 
 def _header(line: str, path: str | os.PathLike[str]) -> dict[str, Any]:
     try:
-        header = json.loads(line)
+        header = parse_json(line, os.fspath(path))
     except ValueError:
         header = None
     if not isinstance(header, dict) or header.get("format") != _FORMAT:
         raise ValueError(f"{os.fspath(path)}: not a file of predictions; its first line is not {_FORMAT!r}")
-    config: dict[str, Any] = header["config"]
+    config: dict[str, Any] = value_of(
+        Mapping[str, Any], header.get("config"), f"{os.fspath(path)}, line 1: config"
+    )
     return config

@@ -3,9 +3,8 @@
 
 from __future__ import annotations
 
-import json
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -18,7 +17,9 @@ from hybridreg.eval.protocols import Protocol
 from hybridreg.eval.recipe import Recipe, slug
 from hybridreg.eval.row import Row
 from hybridreg.io import write_json
+from hybridreg.io.structured import read_json
 from hybridreg.pair import LabelledPair
+from hybridreg.plain_values import build
 
 IDENTITY = "identity"
 _INDEX = "table.json"
@@ -71,6 +72,41 @@ class Table:
         return f"{self.title}. Data {self.data or 'unnamed'}, {runs}; {protocol.describe()}"
 
 
+@dataclass(frozen=True, kw_only=True)
+class Index:
+    """What is noted of a table beside its predictions; `lines` are the names of those that were run."""
+
+    title: str
+    data: str
+    seed: int
+    starts: int
+    protocols: tuple[str, ...]
+    lines: tuple[str, ...]
+    problems: Mapping[str, str]
+    paper: Mapping[str, Any] | None = None
+
+    def __post_init__(self) -> None:
+        if self.starts < 0:
+            raise ValueError(f"{_INDEX}: starts {self.starts} must be 0 or more")
+
+
+@dataclass(frozen=True, kw_only=True)
+class _MadeFrom:
+    """The data that stored rows are of."""
+
+    name: str
+    pairs: int
+    fingerprint: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Made:
+    """What must agree between files of predictions that stand in one table."""
+
+    data: _MadeFrom
+    seed: int
+
+
 def run(
     recipe: Recipe,
     pairs: Sequence[LabelledPair],
@@ -114,7 +150,7 @@ def run(
             data=data,
             on_row=heard,
         )
-    index = {
+    index: dict[str, Any] = {
         "title": recipe.title,
         "data": data,
         "seed": recipe.seed,
@@ -135,16 +171,18 @@ def load(folder: str | os.PathLike[str]) -> Table:
     ------
     FileNotFoundError
         No table was run there.
+    ValueError
+        A file there is damaged, or holds no row yet.
     """
     index = read_index(folder)
-    entries = [_entry(name, _file(Path(folder), name)) for name in index["lines"]]
+    entries = [_entry(name, _file(Path(folder), name)) for name in index.lines]
     return Table(
-        title=index["title"],
-        data=index["data"],
-        seed=index["seed"],
-        starts=index["starts"],
-        problems=index["problems"],
-        paper=paper.parse(index["paper"]) if index.get("paper") else None,
+        title=index.title,
+        data=index.data,
+        seed=index.seed,
+        starts=index.starts,
+        problems=dict(index.problems),
+        paper=None if index.paper is None else paper.parse(index.paper),
         entries=_with_identity(entries),
     )
 
@@ -158,24 +196,39 @@ def of_files(paths: Sequence[str | os.PathLike[str]]) -> Table:
         The files are not of the same data.
     """
     entries = [_entry(Path(path).stem, Path(path)) for path in paths]
-    data = entries[0].config["data"]
-    for entry, path in zip(entries, paths, strict=True):
-        if entry.config["data"]["fingerprint"] != data["fingerprint"]:
+    made = [
+        build(_Made, {key: entry.config.get(key) for key in ("data", "seed")}, f"{os.fspath(path)}, line 1")
+        for entry, path in zip(entries, paths, strict=True)
+    ]
+    for other, path in zip(made, paths, strict=True):
+        if other.data.fingerprint != made[0].data.fingerprint:
             raise ValueError(
                 f"{os.fspath(path)} is of other data than {os.fspath(paths[0])}: "
-                f"{entry.config['data']['name']} and {data['name']}; compare files of the same data"
+                f"{other.data.name} and {made[0].data.name}; compare files of the same data"
             )
-    seed = entries[0].config["seed"]
-    return Table(title="Predictions", data=data["name"], seed=seed, starts=0, entries=_with_identity(entries))
+    return Table(
+        title="Predictions",
+        data=made[0].data.name,
+        seed=made[0].seed,
+        starts=0,
+        entries=_with_identity(entries),
+    )
 
 
-def read_index(folder: str | os.PathLike[str]) -> dict[str, Any]:
-    """What `run` noted of a table."""
+def read_index(folder: str | os.PathLike[str]) -> Index:
+    """What `run` noted of a table.
+
+    Raises
+    ------
+    FileNotFoundError
+        No table was run there.
+    ValueError
+        The note is damaged.
+    """
     path = Path(folder) / _INDEX
     if not path.is_file():
         raise FileNotFoundError(f"{os.fspath(folder)}: no table was run there; run `hybridreg table` first")
-    index: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
-    return index
+    return build(Index, read_json(path), str(path))
 
 
 def _entry(name: str, path: Path) -> Entry:
@@ -185,6 +238,8 @@ def _entry(name: str, path: Path) -> Entry:
 
 def _with_identity(entries: list[Entry]) -> list[Entry]:
     longest = max((entry.rows for entry in entries), key=len, default=[])
+    if not longest:
+        raise ValueError("there are no rows yet; run `hybridreg table` or `hybridreg eval` to the end")
     return [Entry(name=IDENTITY, rows=scoring.identity(longest)), *entries]
 
 

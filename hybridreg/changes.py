@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-import sys
+import os
 from collections.abc import Iterable, Mapping
 from typing import Any
 
@@ -11,11 +11,6 @@ from hybridreg import presets, shipped_weights
 from hybridreg.pipeline import Pipeline
 from hybridreg.slots import SLOTS
 from hybridreg.spec import to_table
-
-if sys.version_info >= (3, 11):
-    import tomllib
-else:
-    import tomli as tomllib
 
 KEYS = ("preset", "pipeline", "voxel", *SLOTS)
 
@@ -44,6 +39,8 @@ def build(changes: Mapping[str, Any]) -> Pipeline:
             f"preset={changes['preset']!r} and pipeline={changes['pipeline']!r}: leave one of them out"
         )
     if "pipeline" in changes:
+        if not isinstance(changes["pipeline"], (str, os.PathLike)):
+            raise ValueError(f"pipeline={changes['pipeline']!r} must be the path of a TOML file")
         start, what = Pipeline.load(changes["pipeline"]), f"pipeline {changes['pipeline']}"
     else:
         name = changes.get("preset", presets.DEFAULT)
@@ -72,7 +69,7 @@ def merge(base: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]
         before = merged.get(key)
         if isinstance(change, Mapping) and "stage" not in change and before is not None:
             before = {"stage": before} if isinstance(before, str) else before
-            merged[key] = {**before, **change}
+            merged[key] = {**before, **change} if isinstance(before, Mapping) else change
         else:
             merged[key] = change
     return merged
@@ -99,7 +96,9 @@ def parse(settings: Iterable[str]) -> dict[str, Any]:
 
 
 def _value(text: str) -> Any:
+    from hybridreg.io.structured import parse_toml
+
     try:
-        return tomllib.loads(f"value = {text}")["value"]
-    except tomllib.TOMLDecodeError:
+        return parse_toml(f"value = {text}", "--set")["value"]
+    except ValueError:
         return text.strip()

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import dataclasses
 import warnings
+from numbers import Integral, Real
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -29,6 +30,8 @@ def with_voxel(downsample: Any, voxel: float | None) -> Any:
     """The downsampling stage with `Pipeline(voxel=...)` put into it."""
     if voxel is None:
         return downsample
+    if isinstance(voxel, bool) or not isinstance(voxel, Real):
+        raise ValueError(f"voxel={voxel!r} must be a positive length in metres")
     if not hasattr(downsample, "voxel"):
         raise ValueError(
             f"voxel={voxel} was given, but {type(downsample).__name__} has no voxel; leave one of them out"
@@ -66,6 +69,12 @@ def check_match(match: Any, estimate: Any) -> None:
         f"it. Matchers that do: {_or(registry.slot_fits('match', gives=word))}. Estimators that work with "
         f"{_label(match)}: {_or(registry.slot_fits('estimate', needs=given))}"
     )
+
+
+def check_seed(seed: int) -> None:
+    """Refuse what numpy's generators take no seed from."""
+    if isinstance(seed, bool) or not isinstance(seed, Integral) or seed < 0:
+        raise ValueError(f"seed={seed!r} must be a whole number, 0 or more")
 
 
 def check_image(pipeline: Pipeline, pair: Pair) -> None:

@@ -38,26 +38,29 @@ def coordinates(x: Any, name: str) -> Array:
     if lying or not upright:
         hint = "; transpose it" if lying else ""
         raise ValueError(f"{name}: expected an array of shape (N, 3), got {array.shape}{hint}")
-    return np.array(array[:, :3], dtype=np.float64)
+    with np.errstate(over="ignore"):  # a long double beyond float64 becomes infinite, and is refused as such
+        return np.array(array[:, :3], dtype=np.float64)
 
 
 def _as_array(x: Any, name: str) -> NDArray[Any]:
-    if hasattr(x, "detach"):  # torch tensor, on any device
-        x = x.detach().cpu().numpy()
-    elif hasattr(x, "point") and hasattr(x, "to_legacy"):  # Open3D tensor cloud
-        if "positions" not in x.point:
-            raise ValueError(
-                f"{name}: the cloud is empty (it has no positions); it needs at least {MIN_POINTS} points"
-            )
-        x = x.point["positions"].cpu().numpy()
-    elif hasattr(x, "points"):  # Open3D legacy cloud, or anything shaped like one
-        x = x.points
     try:
-        return np.asarray(x)
-    except (ValueError, TypeError) as error:
+        array = np.asarray(_held_by(x))
+    except Exception as error:  # the object is somebody else's, and may raise whatever it likes
         raise ValueError(
             f"{name}: cannot read an array of shape (N, 3) from {type(x).__name__}: {error}"
         ) from error
+    return array
+
+
+def _held_by(x: Any) -> Any:
+    if hasattr(x, "detach"):  # torch tensor, on any device
+        x = x.detach().cpu()
+        # numpy has no bfloat16, and float64 holds every other float exactly.
+        return (x.double() if x.is_floating_point() else x).numpy()
+    if hasattr(x, "point") and hasattr(x, "to_legacy"):  # Open3D tensor cloud
+        # One without points has no positions either.
+        return x.point["positions"].cpu().numpy() if "positions" in x.point else np.empty((0, 3))
+    return x.points if hasattr(x, "points") else x  # Open3D legacy cloud, or anything shaped like one
 
 
 def finite(points: Array, name: str, *, drop: bool) -> Array:

@@ -126,7 +126,7 @@ class Pipeline(Stage):
         Raises
         ------
         ValueError
-            For clouds that no pose can be computed from, naming cloud, number and cure.
+            For clouds that no pose can be computed from, naming cloud, number and cure; for a negative seed.
         """
         reset_peak_memory()
         return self.conclude(self.trace(pair, seed=seed, matches=matches), seed=seed)
@@ -162,6 +162,7 @@ class Pipeline(Stage):
     def trace(self, pair: Pair, *, seed: int = 0, matches: Any = None) -> Trace:
         """Run the stages and keep what each of them made."""
         fitting.check_image(self, pair)
+        fitting.check_seed(seed)
         rng = np.random.default_rng([seed, zlib.crc32(pair.id.encode())])
         seconds: dict[str, float] = {}
         with stopwatch(seconds, "downsample"):

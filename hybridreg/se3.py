@@ -101,9 +101,12 @@ def check(T: Any, name: str = "T", tolerance: float = 1e-4) -> Array:
     Raises
     ------
     ValueError
-        Wrong shape, not finite, last row not (0, 0, 0, 1), or a rotation off by more than `tolerance`.
+        No numbers, wrong shape, not finite, last row not (0, 0, 0, 1), or a rotation off by more than `tolerance`.
     """
-    matrix = np.asarray(T, dtype=np.float64)
+    try:
+        matrix = np.asarray(T, dtype=np.float64)
+    except (TypeError, ValueError, OverflowError) as error:
+        raise ValueError(f"{name}: expected numbers of shape (4, 4) ({error})") from error
     if matrix.shape != (4, 4):
         raise ValueError(f"{name}: expected shape (4, 4), got {matrix.shape}")
     if not np.isfinite(matrix).all():
@@ -112,10 +115,12 @@ def check(T: Any, name: str = "T", tolerance: float = 1e-4) -> Array:
         raise ValueError(
             f"{name}: the last row is {matrix[3]}, expected [0 0 0 1]; is the matrix transposed?"
         )
-    error = float(np.abs(matrix[:3, :3] @ matrix[:3, :3].T - np.eye(3)).max())
-    if error > tolerance or np.linalg.det(matrix[:3, :3]) < 0:
+    with np.errstate(over="ignore", invalid="ignore"):
+        error = float(np.abs(matrix[:3, :3] @ matrix[:3, :3].T - np.eye(3)).max())
+        determinant = float(np.linalg.det(matrix[:3, :3]))
+    if not error <= tolerance or determinant < 0:
         raise ValueError(
             f"{name}: the upper left 3x3 block is no rotation (R R^T is off by {error:.2g}, "
-            f"determinant {np.linalg.det(matrix[:3, :3]):.3g}); remove scale or reflection"
+            f"determinant {determinant:.3g}); remove scale or reflection"
         )
     return matrix

@@ -10,12 +10,13 @@ field that is called as a slot holds a stage of that slot, and a table of slots 
 from __future__ import annotations
 
 import dataclasses
+import typing
 from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
-from hybridreg import registry
+from hybridreg import plain_values, registry
 from hybridreg.slots import SLOTS
 from hybridreg.stage import own_params
 
@@ -56,7 +57,7 @@ def from_table(table: Any, slot: str | None = None) -> Any:
     KeyError
         A stage that nobody registered.
     ValueError
-        A field that the stage does not have, or a table without a `stage`.
+        A field that the stage does not have, a value of another type than the field's, or a table without a `stage`.
     """
     if isinstance(table, str):
         table = {"stage": table}
@@ -66,10 +67,24 @@ def from_table(table: Any, slot: str | None = None) -> Any:
     cls = registry.load(own_slot, name)
     fields = {key: _restore(value, key) for key, value in table.items() if key != "stage"}
     try:
-        return cls(**fields)
+        return cls(**_typed(cls, fields, f"{own_slot} stage {name!r}"))
     except TypeError as error:
         known = [f.name for f in dataclasses.fields(cls)] if dataclasses.is_dataclass(cls) else []
         raise ValueError(f"{own_slot} stage {name!r}: {error}; its fields are {', '.join(known)}") from error
+
+
+def _typed(cls: type[Any], fields: dict[str, Any], where: str) -> dict[str, Any]:
+    # A dataclass in Python trusts its caller; a file's author has no type checker.
+    if not dataclasses.is_dataclass(cls):
+        return fields
+    try:
+        hints = typing.get_type_hints(cls)
+    except NameError:  # somebody's annotations, of names that only a type checker imports
+        return fields
+    return {
+        key: plain_values.value_of(hints[key], value, f"{where}: {key}") if key in hints else value
+        for key, value in fields.items()
+    }
 
 
 def _resolve(name: str, slot: str | None) -> tuple[str, str]:

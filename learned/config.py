@@ -8,9 +8,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
-from hybridreg.learned.plain_values import build
+from hybridreg import limits
+from hybridreg.plain_values import build
 
 DEFAULT_NEIGHBOR_LIMITS = (65, 80, 60, 60, 65)
+
+# A configuration may come with a stranger's weights: what no network has is refused before memory is asked for it.
+_WIDEST, _MOST_KERNEL_POINTS, _MOST_BLOCKS, _MOST_NEIGHBORS = 8192, 256, 64, 10_000
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,12 +40,15 @@ class BackboneConfig:
     norm_scope: Literal["stacked", "per_cloud"] = "stacked"
 
     def __post_init__(self) -> None:
+        limits.within(self, 1e-4, 1e4, "voxel", "base_radius", "base_sigma")
+        limits.positive(self, "max_range")
+        limits.within(self, 1, _WIDEST, "init_dim", "groups", "fine_dim")
+        limits.within(self, 2, _MOST_KERNEL_POINTS, "kernel_points")
+        limits.within(self, 1, _MOST_NEIGHBORS, "neighbor_limits")
         if len(self.neighbor_limits) != self.stages:
             raise ValueError(
                 f"{len(self.neighbor_limits)} neighbor_limits for {self.stages} stages: give one a stage"
             )
-        if self.max_range is not None and not self.max_range > 0:
-            raise ValueError(f"max_range {self.max_range} must be above 0 m; null keeps all points")
         if not 1 <= self.fine_stage < self.stages:
             raise ValueError(f"fine_stage {self.fine_stage} must lie in 1..{self.stages - 1}")
         if (self.init_dim // 2) % self.groups:
@@ -84,6 +91,10 @@ class ImageConfig:
     output_stride: Literal[1, 2, 4, 8] = 8
     dropout: float = 0.1  # share of training steps that see the null token instead of the image
 
+    def __post_init__(self) -> None:
+        limits.within(self, 1, _WIDEST, "height", "width", "dim", "stem_dim", "widths", "groups")
+        limits.within(self, 0.0, 1.0, "dropout")
+
 
 @dataclass(frozen=True, kw_only=True)
 class OmpConfig:
@@ -99,6 +110,10 @@ class OmpConfig:
     min_kept: int = 32
     min_kept_share: float = 0.15
 
+    def __post_init__(self) -> None:
+        limits.within(self, 1, _WIDEST, "dim", "heads", "pool")
+        limits.within(self, 0.0, 1.0, "threshold", "min_kept_share")
+
 
 @dataclass(frozen=True, kw_only=True)
 class VgamConfig:
@@ -109,6 +124,10 @@ class VgamConfig:
     point_position: Literal["none", "mlp", "radial"] = "radial"
     pool: int = 2
     gated: bool = False  # residual gates that start at 0: step 0 equals the network without an image
+
+    def __post_init__(self) -> None:
+        limits.within(self, 1, _WIDEST, "heads", "pool")
+        limits.within(self, 0, _MOST_BLOCKS, "repeats")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -125,6 +144,10 @@ class TransformerConfig:
     angle_k: int = 3
 
     def __post_init__(self) -> None:
+        limits.within(self, 1, _WIDEST, "hidden_dim", "output_dim", "heads", "angle_k")
+        limits.within(self, 1e-6, 1e6, "sigma_d", "sigma_a")
+        if len(self.blocks) > _MOST_BLOCKS:
+            raise ValueError(f"{len(self.blocks)} transformer blocks are more than {_MOST_BLOCKS}")
         unknown = sorted(set(self.blocks) - {"self", "cross"})
         if unknown:
             raise ValueError(f"unknown transformer blocks {unknown}: use 'self' and 'cross'")
@@ -158,14 +181,13 @@ class MatchingConfig:
     consistency: float | None = None  # metres by which distances between matches may differ
 
     def __post_init__(self) -> None:
-        for name in ("vote_temperature", "consistency"):
-            value = getattr(self, name)
-            if value is not None and not value > 0:
-                raise ValueError(f"{name} {value} must be above 0; null switches it off")
-        if not 0.0 <= self.uniqueness < 1.0:
-            raise ValueError(f"uniqueness {self.uniqueness} must lie in [0, 1)")
+        limits.at_least(
+            self, 1, "superpoint_matches", "max_superpoints", "patch_points", "sinkhorn_iterations", "topk"
+        )
+        limits.positive(self, "temperature", "matching_radius", "vote_temperature", "consistency")
+        limits.within(self, 0.0, 1.0, "uniqueness")
         if self.uniqueness and self.vote_temperature is None:
-            raise ValueError(f"uniqueness {self.uniqueness} needs a vote_temperature, such as 0.05")
+            raise ValueError(f"uniqueness={self.uniqueness} needs a vote_temperature, such as 0.05")
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -14,6 +14,9 @@ from safetensors.torch import load_file, save
 from torch import Tensor, nn
 
 from hybridreg.io.atomic import write_bytes, write_text
+from hybridreg.io.files import read_whole
+from hybridreg.io.structured import read_json
+from hybridreg.io.torch_file import parse_torch
 from hybridreg.learned.config import NetworkConfig
 from hybridreg.learned.network import RegistrationNetwork
 from hybridreg.learned.official_names import official_name
@@ -53,8 +56,8 @@ def from_pretrained(name_or_folder: str | os.PathLike[str]) -> RegistrationNetwo
     """
     folder = _find(name_or_folder)
     try:
-        config = NetworkConfig.from_dict(json.loads((folder / CONFIG_FILE).read_text(encoding="utf-8")))
-    except (json.JSONDecodeError, UnicodeDecodeError, TypeError) as error:
+        config = NetworkConfig.from_dict(read_json(folder / CONFIG_FILE))
+    except (ValueError, TypeError, ArithmeticError) as error:
         raise ValueError(f"{folder / CONFIG_FILE} is damaged: {error}") from error
     try:
         tensors = load_file(folder / WEIGHTS_FILE)
@@ -140,10 +143,7 @@ def load_official_tensors(network: RegistrationNetwork, tensors: Mapping[str, Te
 def _read_checkpoint(path: Path) -> dict[str, Tensor]:
     if not path.is_file():
         raise FileNotFoundError(f"no checkpoint {os.fspath(path)!r}")
-    try:
-        content = torch.load(path, map_location="cpu", weights_only=True)
-    except Exception as error:  # torch raises half a dozen types for a damaged file
-        raise ValueError(f"{path} is not a checkpoint that can be read safely: {error}") from error
+    content = parse_torch(read_whole(path), str(path))
     state = content.get("model", content) if isinstance(content, dict) else None
     if not isinstance(state, dict) or not all(isinstance(value, Tensor) for value in state.values()):
         raise ValueError(f"{path} holds no state dict, neither at the top nor under 'model'")

@@ -164,7 +164,7 @@ def test_report_draws_what_the_stages_made(pairs: Path, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "told"),
     [
-        (["table", "none.toml", "--data", "pairs"], "none.toml: No such file"),
+        (["table", "none.toml", "--data", "pairs"], "none.toml: no such file"),
         (["table", "mine.toml"], "mine.toml names no data; give --data"),
         (["table", "mine.toml", "--data", "nowhere"], "nowhere: there is no such folder, and no loader"),
         (

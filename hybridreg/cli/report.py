@@ -35,7 +35,7 @@ def command(
 
     folder = paths[0] if len(paths) == 1 and paths[0].is_dir() else None
     if folder is not None:
-        done, names = table.load(folder), table.read_index(folder)["protocols"]
+        done, names = table.load(folder), list(table.read_index(folder).protocols)
     else:
         done, names = table.of_files(paths), ["cross3dreg", "kitti"]
     chosen = [protocol(name) for name in protocols or names]

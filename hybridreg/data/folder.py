@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import zlib
 from pathlib import Path
@@ -11,7 +10,9 @@ from typing import Any
 
 from hybridreg import se3
 from hybridreg.data.dataset import Dataset
+from hybridreg.io.structured import read_json
 from hybridreg.pair import LabelledPair, Pair
+from hybridreg.plain_values import value_of
 
 # Only these reach the pair: calibrations and checks in a meta.json may hold the pose, or let one compute it.
 _FREE_FACTS = ("kind", "source_sensor", "target_sensor", "licence")
@@ -81,7 +82,8 @@ def load_pair(folder: Path) -> LabelledPair:
     facts = {key: meta[key] for key in _FREE_FACTS if key in meta}
     pair = Pair.of(files["source"], files["target"], files.get("image"), id=folder.name, meta=facts)
     truth = se3.check(meta["T_target_source"], f"{files['meta']}: T_target_source")
-    return LabelledPair(pair=pair, T_target_source=truth, overlap=meta.get("overlap"))
+    overlap = value_of(float | None, meta.get("overlap"), f"{files['meta']}: overlap")
+    return LabelledPair(pair=pair, T_target_source=truth, overlap=overlap)
 
 
 def _is_pair(folder: Path) -> bool:
@@ -109,10 +111,7 @@ def _files(folder: Path) -> dict[str, Path]:
 
 
 def _read_meta(path: Path) -> dict[str, Any]:
-    try:
-        meta = json.loads(path.read_text(encoding="utf-8"))
-    except ValueError as error:
-        raise ValueError(f"{path}: not a JSON file ({error})") from error
+    meta = read_json(path)
     if not isinstance(meta, dict) or "T_target_source" not in meta:
         raise ValueError(
             f"{path}: T_target_source is missing; it must be the 4x4 pose that maps source to target"

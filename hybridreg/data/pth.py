@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from hybridreg.data import pickles
 from hybridreg.io.faults import fault, foreign_parser
 from hybridreg.io.files import read_whole
+from hybridreg.io.torch_file import parse_torch
 
 # PyTorch before 1.6 wrote several pickles in a row; the first is this number.
 _OLD_FORMAT = 0x1950A86A20F9469CFC6C
@@ -70,8 +71,6 @@ def _is_tensor(data: bytes, name: str) -> bool:
 
 
 def _tensor(data: bytes, name: str) -> Any:
-    import torch
-
+    tensor = parse_torch(data, name)
     with foreign_parser(name, "a PyTorch tensor"):
-        tensor = torch.load(io.BytesIO(data), map_location="cpu", weights_only=True)
         return tensor.detach().numpy()

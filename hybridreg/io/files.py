@@ -9,13 +9,22 @@ from hybridreg.io.faults import fault
 
 
 def check_file(path: Path) -> None:
-    """Refuse a missing path, a folder, a device and a pipe."""
-    if path.is_dir():
-        raise IsADirectoryError(f"{path}: is a folder; name one file inside it")
-    if not path.exists():
-        raise FileNotFoundError(f"{path}: no such file; check the name (the current folder is {Path.cwd()})")
-    if not path.is_file():
-        raise ValueError(f"{path}: is a device or a pipe; copy its content to a file first")
+    """Refuse a missing path, a folder, a device, a pipe, and a name that no file can have."""
+    try:
+        if path.is_dir():
+            raise IsADirectoryError(f"{path}: is a folder; name one file inside it")
+        if not path.exists():
+            raise FileNotFoundError(
+                f"{path}: no such file; check the name (the current folder is {Path.cwd()})"
+            )
+        if not path.is_file():
+            raise ValueError(f"{path}: is a device or a pipe; copy its content to a file first")
+    except (FileNotFoundError, IsADirectoryError):
+        raise
+    except OSError as error:  # a name that is too long, a share that is gone
+        raise ValueError(
+            f"{str(path)[:200]}: cannot be looked up ({error.strerror}); check the name"
+        ) from error
 
 
 def read_whole(path: Path) -> bytes:

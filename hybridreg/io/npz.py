@@ -13,6 +13,8 @@ from hybridreg.io.faults import fault, foreign_parser
 from hybridreg.io.npy import array_of_npy, array_points, npy_header
 
 _KEYS = ("xyz", "points", "arr_0")
+# Coordinates hardly compress (up to 20 times on a coarse grid); noise of zeros compresses a thousandfold.
+_MODEST, _MOST_EXPANSION = 2**28, 200
 _LONGEST_HEADER = 16384  # numpy itself refuses headers above 10000 bytes
 
 
@@ -22,10 +24,18 @@ def parse_npz(data: bytes, name: str) -> NDArray[np.float64]:
         archive = zipfile.ZipFile(io.BytesIO(data))
     with archive:
         key = _cloud_key(archive, name)
+        _refuse_bomb(archive.getinfo(f"{key}.npy"), f"{name} (array {key!r})")
         with foreign_parser(name, "a zip archive of arrays"):
             content = archive.read(f"{key}.npy")
     label = f"{name} (array {key!r})"
     return array_points(array_of_npy(content, label), label)
+
+
+def _refuse_bomb(member: zipfile.ZipInfo, label: str) -> None:
+    # zipfile unpacks no more than the directory promises, so the promise is what has to be believable.
+    packed, unpacked = member.compress_size, member.file_size
+    if unpacked > _MODEST and unpacked > _MOST_EXPANSION * packed:
+        raise fault(label, f"would unpack from {packed} to {unpacked} bytes, as no cloud does")
 
 
 def _cloud_key(archive: zipfile.ZipFile, name: str) -> str:

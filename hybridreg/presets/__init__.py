@@ -4,17 +4,11 @@
 from __future__ import annotations
 
 import os
-import sys
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
 from hybridreg.slots import SLOTS
-
-if sys.version_info >= (3, 11):
-    import tomllib
-else:
-    import tomli as tomllib
 
 DEFAULT = "default"
 
@@ -34,7 +28,10 @@ def load(name: str) -> dict[str, Any]:
     """
     if name not in names():
         raise KeyError(f"no preset is called {name!r}. Known: {', '.join(names())}")
-    return _slots(files(__name__).joinpath(f"{name}.toml").read_text(encoding="utf-8"), name)
+    from hybridreg.io.structured import parse_toml
+
+    text = files(__name__).joinpath(f"{name}.toml").read_text(encoding="utf-8")
+    return _slots(parse_toml(text, name), name)
 
 
 def read(path: str | os.PathLike[str]) -> dict[str, Any]:
@@ -47,11 +44,9 @@ def read(path: str | os.PathLike[str]) -> dict[str, Any]:
     ValueError
         Not TOML, or a table that is no slot.
     """
-    try:
-        text = Path(path).read_text(encoding="utf-8")
-    except (UnicodeDecodeError, IsADirectoryError) as error:
-        raise ValueError(f"{os.fspath(path)}: not a TOML file ({error})") from error
-    return _slots(text, os.fspath(path))
+    from hybridreg.io.structured import read_toml
+
+    return _slots(read_toml(path), os.fspath(path))
 
 
 def write(path: str | os.PathLike[str], slots: dict[str, Any]) -> None:
@@ -70,11 +65,7 @@ def write(path: str | os.PathLike[str], slots: dict[str, Any]) -> None:
         Path(temporary).write_text(tomli_w.dumps(slots), encoding="utf-8")
 
 
-def _slots(text: str, origin: str) -> dict[str, Any]:
-    try:
-        tables = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise ValueError(f"{origin}: not a TOML file ({error})") from error
+def _slots(tables: dict[str, Any], origin: str) -> dict[str, Any]:
     unknown = set(tables) - {*SLOTS, "voxel"}
     if unknown:
         raise ValueError(

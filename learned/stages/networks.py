@@ -51,6 +51,10 @@ def load(name: NetworkName) -> Loaded:
 
 @lru_cache(maxsize=_HELD)
 def _load(name: NetworkName, stamp: tuple[int, ...]) -> Loaded:
+    try:
+        torch.device(name.device)
+    except RuntimeError as error:
+        raise ValueError(f"device={name.device!r}: {str(error).splitlines()[0]}") from error
     if name.device.startswith("cuda") and not torch.cuda.is_available():
         raise ValueError(f"device={name.device!r}: torch finds no GPU here; use device='cpu'")
     # A module draws weights when it is made; the caller's generator must not notice.

@@ -12,6 +12,8 @@ import torch
 
 from hybridreg import __version__
 from hybridreg.io.atomic import atomic_path
+from hybridreg.io.files import read_whole
+from hybridreg.io.torch_file import parse_torch
 
 _FORMAT = 1
 
@@ -63,11 +65,10 @@ def load(path: str | os.PathLike[str]) -> dict[str, Any]:
     """
     if not Path(path).is_file():
         raise FileNotFoundError(f"{os.fspath(path)}: there is no checkpoint to resume from")
-    try:
-        content: dict[str, Any] = torch.load(path, map_location="cpu", weights_only=True)
-    except Exception as error:  # torch raises half a dozen types for a damaged file
-        raise ValueError(f"{os.fspath(path)} is damaged: {error}") from error
-    if content.get("format") != _FORMAT:
+    content: dict[str, Any] = parse_torch(read_whole(Path(path)), os.fspath(path))
+    if not isinstance(content, dict) or "format" not in content:
+        raise ValueError(f"{os.fspath(path)}: is damaged, or no checkpoint of a training run")
+    if content["format"] != _FORMAT:
         raise ValueError(f"{os.fspath(path)}: a checkpoint of format {content.get('format')}, not {_FORMAT}")
     content["progress"] = Progress(**content["progress"])
     return content

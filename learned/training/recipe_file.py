@@ -5,21 +5,16 @@ from __future__ import annotations
 
 import dataclasses
 import os
-import sys
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from hybridreg.io.structured import read_toml
 from hybridreg.learned import recipes
 from hybridreg.learned.config import NetworkConfig
-from hybridreg.learned.plain_values import build
 from hybridreg.learned.sizes import named_config
 from hybridreg.learned.training.recipe import Phase, Recipe
-
-if sys.version_info >= (3, 11):
-    import tomllib
-else:
-    import tomli as tomllib
+from hybridreg.plain_values import build, value_of
 
 _NETWORK_KEYS = {"size": "small", "omp": True, "vgam": True}
 
@@ -46,10 +41,7 @@ def _content(name: str, behind: tuple[str, ...] = ()) -> dict[str, Any]:
     # ``base`` names a recipe whose values count where this one gives none; tables are merged, lists replaced.
     if name in behind:
         raise ValueError(f"{behind[0]}: base goes round in a circle: {' -> '.join((*behind, name))}")
-    try:
-        table = tomllib.loads(recipes.find(name).read_text(encoding="utf-8"))
-    except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise ValueError(f"{name}: not a TOML file ({error})") from error
+    table = read_toml(recipes.find(name))
     base = table.pop("base", None)
     if base is None:
         return table
@@ -60,8 +52,12 @@ def _content(name: str, behind: tuple[str, ...] = ()) -> dict[str, Any]:
 
 def parse(table: Mapping[str, Any], *, name: str) -> Recipe:
     """The recipe of a file's content: ``size``, ``omp``, ``vgam`` choose the network, ``[network]`` alters it."""
-    base = {key: table.get(key, default) for key, default in _NETWORK_KEYS.items()}
-    network = network_of(base["size"], omp=base["omp"], vgam=base["vgam"], changes=table.get("network", {}))
+    base: dict[str, Any] = {
+        key: value_of(type(default), table.get(key, default), f"recipe.{key}")
+        for key, default in _NETWORK_KEYS.items()
+    }
+    altered = value_of(Mapping[str, Any], table.get("network", {}), "recipe.network")
+    network = network_of(base["size"], omp=base["omp"], vgam=base["vgam"], changes=altered)
     rest = {key: value for key, value in table.items() if key not in _NETWORK_KEYS}
     return build(Recipe, {"name": name, **rest, "network": network.to_dict()}, "recipe")
 

@@ -36,5 +36,5 @@ def test_without_a_range_all_points_stay() -> None:
 
 
 def test_a_range_must_be_positive() -> None:
-    with pytest.raises(ValueError, match="max_range 0"):
+    with pytest.raises(ValueError, match="max_range=0.0 must be positive"):
         BackboneConfig(max_range=0.0)

@@ -257,10 +257,10 @@ def test_image_encoder_strides_and_dropout(nano: NetworkConfig, stride: int) -> 
 @pytest.mark.parametrize(
     ("changes", "told"),
     [
-        ({"vote_temperature": 0.0}, "vote_temperature 0.0 must be above 0"),
-        ({"consistency": -1.0}, "consistency -1.0 must be above 0"),
-        ({"uniqueness": 1.0, "vote_temperature": 0.1}, "uniqueness 1.0 must lie in"),
-        ({"uniqueness": 0.1}, "uniqueness 0.1 needs a vote_temperature"),
+        ({"vote_temperature": 0.0}, "vote_temperature=0.0 must be positive"),
+        ({"consistency": -1.0}, "consistency=-1.0 must be positive"),
+        ({"uniqueness": 1.5, "vote_temperature": 0.1}, "uniqueness=1.5 must lie in"),
+        ({"uniqueness": 0.1}, "uniqueness=0.1 needs a vote_temperature"),
     ],
 )
 def test_matching_that_cannot_be_is_refused(changes: dict[str, float], told: str) -> None:

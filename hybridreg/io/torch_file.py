@@ -1,0 +1,37 @@
+# SPDX-License-Identifier: MIT
+"""What `torch.save` wrote, read without running anything that a file carries."""
+
+from __future__ import annotations
+
+import io
+from typing import Any
+
+from hybridreg.io.faults import fault, shorten
+
+_TRUSTED = "nothing of it was run; take the file from where its authors publish it"
+
+
+def parse_torch(data: bytes, name: str) -> Any:
+    """Tensors and plain containers out of the file called `name`, on the CPU.
+
+    Raises
+    ------
+    ValueError
+        Damaged, or with anything else inside than tensors, numbers, texts and containers of them.
+    ImportError
+        Without torch.
+    """
+    import torch
+
+    try:
+        return torch.load(io.BytesIO(data), map_location="cpu", weights_only=True)
+    except Exception as error:  # torch raises half a dozen types for a damaged file
+        problem = f"is damaged, or nothing that can be read safely ({_reason(error)})"
+        raise fault(name, problem, _TRUSTED) from error
+
+
+def _reason(error: Exception) -> str:
+    # torch's own text recommends `weights_only=False`, which is what must not be done.
+    lines = [line.strip() for line in str(error).splitlines() if line.strip()]
+    telling = [line for line in lines if "weights_only" not in line and "documentation" not in line]
+    return shorten(telling[0] if telling else type(error).__name__, 160)

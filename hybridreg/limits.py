@@ -1,0 +1,51 @@
+# SPDX-License-Identifier: MIT
+"""Bounds on the fields of a stage, checked when it is made: a wrong number is told where it was written."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+
+def positive(stage: Any, *names: str) -> None:
+    """Each named field must be None, a finite number above 0, or a list of such, which may not be empty.
+
+    Raises
+    ------
+    ValueError
+        Naming the field and its value.
+    """
+    for name in names:
+        value = getattr(stage, name)
+        items = value if isinstance(value, (tuple, list)) else (value,)
+        if value is not None and not (items and all(0.0 < item < math.inf for item in items)):
+            raise ValueError(f"{name}={value} must be positive and finite")
+
+
+def within(stage: Any, low: float, high: float, *names: str) -> None:
+    """Each named field, or each item of one that is a list, must lie in `low` to `high`.
+
+    Raises
+    ------
+    ValueError
+        Naming the field and its value.
+    """
+    for name in names:
+        value = getattr(stage, name)
+        items = value if isinstance(value, (tuple, list)) else (value,)
+        if not all(low <= item <= high for item in items):
+            raise ValueError(f"{name}={value} must lie in {low:g} to {high:g}")
+
+
+def at_least(stage: Any, low: int, *names: str) -> None:
+    """Each named field must be `low` or more.
+
+    Raises
+    ------
+    ValueError
+        Naming the field and its value.
+    """
+    for name in names:
+        value = getattr(stage, name)
+        if not value >= low:
+            raise ValueError(f"{name}={value} must be at least {low}")

@@ -1,0 +1,101 @@
+# SPDX-License-Identifier: MIT
+"""Frozen dataclasses from plain values, as TOML and JSON give them; unknown keys are refused by name."""
+
+from __future__ import annotations
+
+import dataclasses
+import types
+import typing
+from collections.abc import Mapping
+from typing import Any, Literal, TypeVar
+
+T = TypeVar("T")
+_WANTED = {bool: "true or false", int: "a number", float: "a number", str: "a text"}
+
+
+def build(cls: type[T], values: Mapping[str, Any], where: str) -> T:
+    """An instance of a dataclass from a mapping, nested ones and tuples of them included.
+
+    Raises
+    ------
+    ValueError
+        An unknown key or a value of the wrong kind: it is named, with its place after ``where``.
+    """
+    if not isinstance(values, Mapping):
+        raise ValueError(f"{where}: expected a table, got {_shown(values)}")
+    hints = typing.get_type_hints(cls)
+    unknown = sorted(set(values) - set(hints))
+    if unknown:
+        raise ValueError(f"{where}: unknown keys {unknown}; known are {sorted(hints)}")
+    missing = [f.name for f in dataclasses.fields(cls) if _required(f) and f.name not in values]  # type: ignore[arg-type]
+    if missing:
+        raise ValueError(f"{where}: {', '.join(missing)} missing")
+    return cls(**{name: value_of(hints[name], value, f"{where}.{name}") for name, value in values.items()})
+
+
+def value_of(hint: Any, value: Any, where: str) -> Any:
+    """A value as an annotation wants it: lists become tuples, whole numbers floats.
+
+    What an annotation does not tell (`Any`, a class of somebody's own) goes through as it is.
+
+    Raises
+    ------
+    ValueError
+        A value of another kind; the message begins with ``where``.
+    """
+    origin, parts = typing.get_origin(hint), typing.get_args(hint)
+    if origin in (typing.Union, types.UnionType):
+        return _optional(parts, value, where)
+    if dataclasses.is_dataclass(hint):
+        return build(typing.cast(type, hint), value, where)
+    if origin is tuple:
+        _checked(isinstance(value, (list, tuple)), value, where, "a list")
+        return tuple(value_of(parts[0], item, f"{where}[{i}]") for i, item in enumerate(value))
+    if origin is list:
+        _checked(isinstance(value, list), value, where, "a list")
+        return [value_of(parts[0], item, f"{where}[{i}]") for i, item in enumerate(value)]
+    if isinstance(origin, type) and issubclass(origin, Mapping):
+        _checked(isinstance(value, Mapping), value, where, "a table")
+        return {
+            value_of(parts[0], key, where): value_of(parts[1], item, f"{where}.{key}")
+            for key, item in value.items()
+        }
+    if origin is Literal:
+        # Not `in` alone: True is 1, and a list has no hash to be looked up by.
+        right = any(type(part) is type(value) and part == value for part in parts)
+        return _checked(right, value, where, f"one of {', '.join(map(repr, parts))}")
+    return _plain(hint, value, where)
+
+
+def _required(field: dataclasses.Field[Any]) -> bool:
+    return field.default is dataclasses.MISSING and field.default_factory is dataclasses.MISSING
+
+
+def _optional(parts: tuple[Any, ...], value: Any, where: str) -> Any:
+    if value is None and type(None) in parts:
+        return None
+    return value_of(next(part for part in parts if part is not type(None)), value, where)
+
+
+def _plain(hint: Any, value: Any, where: str) -> Any:
+    if hint is float and isinstance(value, int) and not isinstance(value, bool):
+        try:
+            return float(value)
+        except OverflowError:
+            return _checked(False, value, where, "a number below 1e308")
+    if hint in (bool, int, float, str):
+        right = isinstance(value, hint) and (hint is bool or not isinstance(value, bool))
+        fraction = hint is int and isinstance(value, float)
+        return _checked(right, value, where, "a whole number" if fraction else _WANTED[hint])
+    return value
+
+
+def _checked(right: bool, value: Any, where: str, wanted: str) -> Any:
+    if not right:
+        raise ValueError(f"{where}: expected {wanted}, got {_shown(value)}")
+    return value
+
+
+def _shown(value: Any) -> str:
+    shown = repr(value)
+    return shown if len(shown) <= 200 else f"{shown[:200]}..."
