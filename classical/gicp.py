@@ -23,6 +23,8 @@ Side = Literal["source", "target"]
 
 # Steps at which a round ends, and how many times larger they may be in the rounds before the last.
 _STILL_RAD, _STILL_M, _COARSE = 1e-5, 1e-4, 100.0
+# Share of the points that lay on the target before and must do so after.
+_KEPT = 0.9
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -73,9 +75,10 @@ class Gicp(Stage):
 
 
 def not_worse(scene: Scene, before: Pose, T: Array) -> Pose:
-    """The refined pose, unless fewer source points lie on the target than before (methods of 2025-09, 9.5).
+    """The refined pose, unless far fewer source points lie on the target than before (methods of 2025-09, 9.5).
 
-    small_gicp reports convergence also where it slid away or had no partner left, so the count decides.
+    small_gicp reports convergence also where it slid away or had no partner left, so the count decides. It may fall
+    a little: a pose that is a degree off can bring more points of sparse rings near one another than the true one.
     """
     if not np.isfinite(T).all():
         return before
@@ -83,7 +86,7 @@ def not_worse(scene: Scene, before: Pose, T: Array) -> Pose:
         measure(scene.source.points, tree(scene, "target"), M, 1.25 * scene.spacing).fitness
         for M in (before.T, T)
     ]
-    return Pose(T, before.inliers, before.rivals) if on[1] >= 0.98 * on[0] else before
+    return Pose(T, before.inliers, before.rivals) if on[1] >= _KEPT * on[0] else before
 
 
 def _prepared(scene: Scene, side: Side, voxel: float, neighbours: int) -> tuple[Any, Any]:
