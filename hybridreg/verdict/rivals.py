@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -25,7 +25,9 @@ _OFFERED, _SETTLED, _CLOSELY = 4, 6, 3
 _SLIDES = (-16.0, -8.0, 8.0, 16.0)
 # Nearer than this (spacings, degrees) a rival is the pose itself.
 _APART, _TURNED = 3.0, 5.0
-_QUICK, _CLOSE = 5, 2
+_QUICK, _CLOSE, _ROUGHLY = 5, 2, 3
+# Best of many starts that are looked at closely.
+_KEPT = 8
 
 
 class Rival(NamedTuple):
@@ -41,12 +43,17 @@ def support(agreement: Agreement) -> float:
     return float(agreement.shares.min() - agreement.looked_through)
 
 
-def best_first(scene: Scene, starts: Iterable[Array]) -> list[Rival]:
-    """Each of `starts` (4, 4) where it fits best, the best supported first; of those that meet, one."""
+def best_first(scene: Scene, starts: Sequence[Array]) -> list[Rival]:
+    """The best supported of `starts` (4, 4), at most eight, each where it fits best; of those that meet, one."""
     source, target = views.views(scene)
     spacing = views.spacing(scene)
-    settled = [settle(source, target, start, spacing) for start in starts]
-    return distinct(scene, [Rival(T, support(compare(source, target, T, spacing))) for T in settled])
+
+    def settled(start: Array, every: int) -> Rival:
+        T = settle(source, target, start, spacing, every=3 * every)
+        return Rival(T, support(compare(source, target, T, spacing, every=every)))
+
+    quickly = distinct(scene, [settled(start, _ROUGHLY) for start in starts])
+    return distinct(scene, [settled(rival.T, 1) for rival in quickly[:_KEPT]])
 
 
 def distinct(scene: Scene, found: Iterable[Rival]) -> list[Rival]:
