@@ -20,6 +20,7 @@ from hybridreg.classical.voxel import VoxelGrid
 from hybridreg.matches import Correspondences, Pose
 from hybridreg.scene import Scene
 from hybridreg.stage import Stage
+from hybridreg.verdict.confidence import NEARLY
 from hybridreg.verdict.rivals import Rival, best_first, distinct
 
 Array = NDArray[np.float64]
@@ -32,8 +33,8 @@ _COARSE, _REACH = 3.0, 200.0
 # Degrees between yaws; the share of the best peak's score that a peak needs: along a corridor the walls outvote what
 # tells one place from another.
 _YAW_STEP_DEG, _SHARE = 4.0, 0.65
-# A best pose with less support than this is looked at again; so far the spectra are levelled then.
-_PLAIN, _WHITEN = 0.3, (0.0, 0.75)
+# How far the spectra are levelled when the best pose is not plain.
+_WHITEN = (0.0, 0.75)
 # A plane that leans more than this may be the wall beside a sensor that sees little ground, degrees.
 _STEEP_DEG = 40.0
 
@@ -93,7 +94,7 @@ class BirdsEye(Stage):
                 planar = self._planar(views[0][i], views[1][j], voxel)
                 T_target_level = se3.inverse(frames[1][j])
                 here = best_first(scene, [T_target_level @ M @ frames[0][i] for M in planar])
-                if here[0].support < _PLAIN:
+                if here[0].support < NEARLY:
                     T_level_source = _over_the_origin(frames[1][j] @ here[0].T)
                     levelled = self._view(own, "source", T_level_source, voxel)
                     again = self._slid(levelled, views[1][j], voxel)

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -86,7 +86,7 @@ def not_worse(scene: Scene, before: Pose, T: Array) -> Pose:
         measure(scene.source.points, tree(scene, "target"), M, 1.25 * scene.spacing).fitness
         for M in (before.T, T)
     ]
-    return Pose(T, before.inliers, before.rivals) if on[1] >= _KEPT * on[0] else before
+    return replace(before, T=T) if on[1] >= _KEPT * on[0] else before
 
 
 def _prepared(scene: Scene, side: Side, voxel: float, neighbours: int) -> tuple[Any, Any]:
