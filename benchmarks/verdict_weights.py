@@ -1,209 +1,211 @@
 # SPDX-License-Identifier: MIT
-"""The weights of the verdict's confidence, from simulated scenes alone.
+"""The rule behind the verdict's confidence, fitted to what `default` considers on simulated training pairs.
 
-    python -m benchmarks.verdict_weights --worlds 72
+    python -m benchmarks.verdict_weights gather --rows runs/evidence.jsonl --pairs 40
+    python -m benchmarks.verdict_weights fit --rows runs/evidence.jsonl --write hybridreg/verdict/model.json
 
-Each world (streets, crossings, yards, woods, rooms, corridors) is seen by two sensors, one in ten upside down and
-one in ten tilted by 30 degrees, with a third of the cars moved in between. Right poses, refined or slightly off,
-stand against half turns, slides, the best of several random yaws, and the best pose on another world's target; all
-wrong ones are refined by small_gicp first. Prints the logistic regression's weights, then how it does on worlds
-that it was not fitted to (eight-fold, divided by world).
+`gather` runs the recipes of `default` on `sim:train` (every tier, disjoint pairs too) and on the worlds of the
+verdict's tests (rooms, corridors, yards, woods), and writes one line for each answer: its evidence, that of its best
+rival, and whether it is right. An answer is the best pose after the first recipe and after the last that `default`
+runs; and, as if the right pose had not been found, the best wrong one. `fit` prints how the rule does on pairs that
+it was not fitted to (five-fold), and writes it. No real pair and no validation or test pair takes part.
 """
 
 from __future__ import annotations
 
 import argparse
-import copy
-import sys
+import json
 from collections.abc import Iterator
-from dataclasses import dataclass
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from hybridreg import se3
-from hybridreg.classical.voxel import VoxelGrid
-from hybridreg.cloud import PointCloud
+import hybridreg as hr
+from benchmarks.made_sights import sight
+from hybridreg.data import open_dataset
+from hybridreg.eval import metrics
 from hybridreg.matches import Correspondences, Pose
 from hybridreg.pair import Pair
-from hybridreg.verdict import judge
-from hybridreg.verdict.confidence import MARGIN_COUNTS, WEIGHTS, confidence
-
-sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "tests" / "verdict"))
-import worlds
+from hybridreg.scene import Scene
+from hybridreg.verdict import weigh
+from hybridreg.verdict.confidence import NO_RIVAL, OK, confidence
+from hybridreg.verdict.rivals import Rival
+from hybridreg.verdict.support import model, terms
 
 Array = NDArray[np.float64]
-KINDS = ("street", "crossing", "yard", "wood", "room", "corridor")
-SOURCES = ("rings16", "rings32", "rings64", "hemisphere", "rosette", "raster")
-TARGETS = ("rings32", "rings64", "rings64", "hemisphere", "rings16")
+Row = dict[str, Any]
+TIERS = ("near", "mid", "far", "degenerate", "disjoint", "worlds")
+# A wrong answer where the right one was found would seldom be given: so much it counts, beside a right one.
+AS_IF = 0.15
+# Penalty on the squared weights of the standardised terms, per answer.
+RIDGE = 1e-3
+NAMES = tuple(model().weights)
 
 
-@dataclass(frozen=True, eq=False)
-class Sight:
-    """One world as two sensors saw it; lengths of the search in units of `voxel`."""
-
-    kind: str
-    source: Array
-    target: Array
-    truth: Array
-    T_world_target: Array
-    voxel: float
-
-    @property
-    def indoor(self) -> bool:
-        return self.kind in ("room", "corridor")
+def pairs(tier: str, indices: range) -> Iterator[tuple[str, Pair, Array | None, float]]:
+    """Name, clouds, true pose (None where there is none) and metres within which a pose is right."""
+    if tier == "worlds":
+        for i in indices:
+            here = sight(i)
+            yield f"world-{i}", here.pair, here.truth, 0.2 if here.indoor else 0.5
+        return
+    data = open_dataset(f"sim:train/{tier}#{indices.stop}")
+    for i in indices:
+        labelled = data.load(i)
+        truth = None if tier == "disjoint" else labelled.T_target_source
+        yield labelled.pair.id, labelled.pair, truth, 0.5
 
 
-def build(kind: str, rng: np.random.Generator) -> worlds.World:
-    """A world of a kind."""
-    if kind in ("street", "crossing"):
-        return worlds.street(rng, crossing=kind == "crossing")
-    if kind in ("room", "corridor"):
-        return worlds.room(rng, corridor=kind == "corridor")
-    return worlds.yard(rng) if kind == "yard" else worlds.wood(rng)
+def answers(scene: Scene, truth: Array | None, metres: float) -> Iterator[Row]:
+    """Evidence of the answers to one pair."""
+    candidates = hr.Pipeline.preset("default").estimate
+    stages: list[list[Rival]] = []
+    for found in candidates.stages(scene, Correspondences.none(), np.random.default_rng(0)):
+        if found:
+            stages.append(found)
+            if weigh(scene, _pose(found)).confidence >= OK:
+                break
+    looked_at = [stages[0], stages[-1]] if len(stages) > 1 else stages
+    for found in looked_at:
+        right = [_right(one.T, truth, metres) for one in found]
+        share = 1.0 / len(looked_at)
+        yield {**_told(scene, found), "right": right[0] is True, "weight": share}
+        wrong = [one for one, well in zip(found, right, strict=True) if well is False]
+        if right[0] and wrong:
+            yield {**_told(scene, wrong), "right": False, "weight": share * AS_IF}
 
 
-def sight(i: int) -> Sight:
-    """The i-th pair of scans."""
-    rng = np.random.default_rng(1000 + i)
-    kind = KINDS[i % len(KINDS)]
-    before, indoor = build(kind, rng), kind in ("room", "corridor")
-    after = copy.deepcopy(before)
-    for j, (centre, half, yaw) in enumerate(after.boxes):
-        if not indoor and half[2] < 1.0 and rng.random() < 0.3:
-            after.boxes[j] = (centre + [rng.normal(0.0, 5.0), 0.0, 0.0], half, yaw)
-    z = 1.3 if indoor else 1.8
-    apart = rng.uniform(-1, 1) if indoor else rng.choice([0, 3, 8, 15]) * rng.choice([-1, 1])
-    tilt = rng.choice([180.0, 30.0, rng.normal(0.0, 2.0)], p=[0.1, 0.1, 0.8])
-    T_world_target = worlds.sensor_pose(0, rng.uniform(-0.3, 0.3), z, rng.uniform(0, 360), rng.normal(0, 1))
-    T_world_source = worlds.sensor_pose(apart, rng.uniform(-0.5, 0.5), z, rng.uniform(0, 360), tilt)
-    source = worlds.scan(after, str(rng.choice(SOURCES)), T_world_source, rng)
-    target = worlds.scan(before, str(rng.choice(TARGETS)), T_world_target, rng)
-    truth = se3.inverse(T_world_target) @ T_world_source
-    return Sight(kind, source, target, truth, T_world_target, 0.15 if indoor else 0.5)
+def _told(scene: Scene, found: list[Rival]) -> Row:
+    weighed = weigh(scene, _pose(found))
+    rival = [weigh(scene, Pose(one.T, found=False)).evidence for one in weighed.rivals[:1]]
+    return {"evidence": weighed.evidence, "rival": rival}
 
 
-class Search:
-    """small_gicp on one source and one target, at the scale of the place."""
-
-    def __init__(self, source: Array, target: Array, voxel: float) -> None:
-        import small_gicp
-        from scipy.spatial import cKDTree
-
-        self.voxel, self.few = voxel, source[::5]
-        self.tree = cKDTree(target[::2])
-        self.source, _ = small_gicp.preprocess_points(source, downsampling_resolution=0.8 * voxel)
-        self.target, self.target_tree = small_gicp.preprocess_points(
-            target, downsampling_resolution=0.8 * voxel
-        )
-
-    def refine(self, T: Array) -> Array:
-        import small_gicp
-
-        for distance in (6.0 * self.voxel, 2.0 * self.voxel):
-            T = small_gicp.align(
-                self.target, self.source, self.target_tree, T, max_correspondence_distance=distance
-            ).T_target_source
-        return T
-
-    def covered(self, T: Array) -> float:
-        gaps = self.tree.query(se3.apply(T, self.few), distance_upper_bound=self.voxel)[0]
-        return float(np.isfinite(gaps).mean())
-
-    def best(self, level: Array, up: Array, rng: np.random.Generator, n_starts: int = 6) -> Array:
-        """Best covered of random turns about `up` after `level`, with random shifts, refined."""
-        starts = []
-        for i in range(n_starts):
-            R = se3.rotation_about(np.radians(360.0 * i / n_starts + rng.uniform(0, 20)) * up) @ level[:3, :3]
-            shift = rng.uniform(-10.0, 10.0, 3) * self.voxel
-            starts.append(se3.from_rt(R, level[:3, 3] + shift - up * (up @ shift)))
-        return max((self.refine(T) for T in starts), key=self.covered)
+def _pose(found: list[Rival]) -> Pose:
+    return replace(Pose.ranked([one.T for one in found]), recipes=found[0].recipes)
 
 
-def poses(here: Sight, rng: np.random.Generator) -> Iterator[Array]:
-    """Poses of one pair to judge, right and wrong."""
-    search, voxel, truth = Search(here.source, here.target, here.voxel), here.voxel, here.truth
-    up, street = here.T_world_target[2, :3], here.T_world_target[0, :3]
-    near = truth @ se3.exp(rng.normal(0.0, 1.0, 6) * np.repeat([0.003, 0.1 * voxel], 3))
-    yield near
-    yield search.refine(near)
-    half = se3.rotation_about(np.pi * up)
-    yield search.refine(se3.from_rt(half @ truth[:3, :3], truth[:3, 3]))
-    for length in (-20.0, -10.0, 10.0, 20.0):
-        yield search.refine(se3.from_rt(np.eye(3), length * voxel * street) @ truth)
-    yield search.best(truth, up, rng)
-
-
-def elsewhere(here: Sight, there: Sight, rng: np.random.Generator) -> Array:
-    """Best pose of one world's source on another's target, both upright, the sensors at one height."""
-    level = (there.T_world_target[:3, :3].T @ here.T_world_target[:3, :3]) @ here.truth[:3, :3]
-    search = Search(here.source, there.target, here.voxel)
-    return search.best(se3.from_rt(level, np.zeros(3)), there.T_world_target[2, :3], rng)
-
-
-def is_right(T: Array, here: Sight) -> bool | None:
-    """None between right (2 degrees and 0.5 m; 0.2 m in a room) and wrong (5 degrees or 2 m; 0.5 m)."""
-    angle = se3.angle_deg(T[:3, :3] @ here.truth[:3, :3].T)
-    metres = float(np.linalg.norm(T[:3, 3] - here.truth[:3, 3]))
-    if angle < 2.0 and metres < (0.2 if here.indoor else 0.5):
+def _right(T: Array, truth: Array | None, metres: float) -> bool | None:
+    # None between right (2 degrees) and wrong (5 degrees, or four times the metres).
+    if truth is None:
+        return False
+    rre, rte = metrics.rre_deg(T, truth), metrics.rte_m(T, truth)
+    if rre < 2.0 and rte < metres:
         return True
-    return False if angle > 5.0 or metres > (0.5 if here.indoor else 2.0) else None
+    return False if rre > 5.0 or rte > 4.0 * metres else None
 
 
-def evidence(n_worlds: int) -> Iterator[tuple[dict[str, float], bool, int]]:
-    """Evidence, whether the pose is right, and the world."""
-    sights = [sight(i) for i in range(n_worlds)]
-    for i, here in enumerate(sights):
-        rng = np.random.default_rng(i)
-        there = sights[(i + len(KINDS)) % n_worlds]
-        made = [(here, T, is_right(T, here)) for T in poses(here, rng)] + [
-            (there, elsewhere(here, there, rng), False)
-        ]
-        for other, T, right in made:
-            if right is not None:
-                pair = Pair(source=PointCloud.of(here.source), target=PointCloud.of(other.target))
-                yield judge(VoxelGrid()(pair), Pose(T), Correspondences.none()).evidence, right, i
+def _rows(job: tuple[str, int]) -> list[Row]:
+    tier, i = job
+    (name, pair, truth, metres), *_ = pairs(tier, range(i, i + 1))
+    return [{"pair": name, "tier": tier, **row} for row in answers(hr.VoxelGrid()(pair), truth, metres)]
+
+
+def gather(path: Path, n_pairs: int, workers: int) -> None:
+    """Append the rows of pairs that the file does not hold."""
+    held = read(path)
+    n_held = {tier: len({row["pair"] for row in held if row["tier"] == tier}) for tier in TIERS}
+    jobs = [(tier, i) for i in range(n_pairs) for tier in TIERS if i >= n_held[tier]]
+    with ProcessPoolExecutor(workers) as pool, path.open("a") as file:
+        for rows in pool.map(_rows, jobs):
+            file.write("".join(json.dumps(row) + "\n" for row in rows))
+            file.flush()
+
+
+def read(path: Path) -> list[Row]:
+    """Rows of an earlier call; none where there was none."""
+    return [json.loads(line) for line in path.read_text().splitlines()] if path.exists() else []
+
+
+def fit(rows: list[Row]) -> tuple[dict[str, float], float]:
+    """Weights of the terms and intercept that make the rows likeliest (`hybridreg.verdict.confidence`)."""
+    from scipy.optimize import minimize
+
+    own, rival, right, weight = _arrays(rows)
+    middle, width = own.mean(axis=0), own.std(axis=0)
+
+    def score(X: Array, v: Array) -> Array:
+        return np.maximum((X - middle) / width @ v[:-1] + v[-1], -50.0)
+
+    def loss(v: Array) -> float:
+        s = score(own, v)
+        r = np.where(np.isnan(rival[:, 0]), -50.0, score(np.nan_to_num(rival), v))
+        all_of_them = np.logaddexp(np.logaddexp(0.0, s), r)
+        nll = all_of_them - np.where(right, s, np.logaddexp(0.0, r))
+        return float(weight @ nll + RIDGE * weight.sum() * v[:-1] @ v[:-1])
+
+    v = minimize(loss, np.zeros(own.shape[1] + 1), method="L-BFGS-B").x
+    weights = v[:-1] / width
+    return dict(zip(NAMES, weights.tolist(), strict=True)), float(v[-1] - middle @ weights)
+
+
+def _arrays(rows: list[Row]) -> tuple[Array, Array, NDArray[np.bool_], Array]:
+    own = np.array([[terms(row["evidence"])[name] for name in NAMES] for row in rows])
+    lacking = dict.fromkeys(NAMES, np.nan)
+    rival = np.array(
+        [[(terms(row["rival"][0]) if row["rival"] else lacking)[name] for name in NAMES] for row in rows]
+    )
+    return own, rival, np.array([row["right"] for row in rows]), np.array([row["weight"] for row in rows])
+
+
+def predicted(rows: list[Row], weights: dict[str, float], intercept: float) -> Array:
+    """Probability of each row under a rule."""
+    own, rival, _, _ = _arrays(rows)
+    v = np.array([weights[name] for name in NAMES])
+    s = own @ v + intercept
+    margin = np.where(np.isnan(rival[:, 0]), NO_RIVAL, np.nan_to_num(rival) @ v + intercept - s)
+    return np.array([confidence({"support": a, "rival_margin": b}) for a, b in zip(s, margin, strict=True)])
+
+
+def unseen(rows: list[Row], folds: int = 5) -> Array:
+    """Probability of each row under the rule fitted to the other pairs."""
+    names = sorted({row["pair"] for row in rows})
+    fold = dict(zip(names, np.random.default_rng(0).permutation(len(names)) % folds, strict=True))
+    its = np.array([fold[row["pair"]] for row in rows])
+    p = np.zeros(len(rows))
+    for k in range(folds):
+        rule = fit([row for row, f in zip(rows, its, strict=True) if f != k])
+        p[its == k] = predicted([row for row, f in zip(rows, its, strict=True) if f == k], *rule)
+    return p
+
+
+def report(rows: list[Row], p: Array) -> None:
+    """Print how probabilities `p` do, in all and for each tier."""
+    right, weight = np.array([row["right"] for row in rows]), np.array([row["weight"] for row in rows])
+    tier = np.array([row["tier"] for row in rows])
+    print(f"{len(rows)} answers: Brier score {np.average((p - right) ** 2, weights=weight):.4f}")
+    for name in TIERS:
+        good, bad = p[right & (tier == name)], p[~right & (tier == name)]
+        print(
+            f"  {name:10s} of {len(good):3d} right answers {np.mean(good >= OK) if len(good) else 0:4.0%} ok; "
+            f"of {len(bad):3d} wrong ones {np.sum(bad >= OK):2d} ok"
+        )
 
 
 def main() -> None:
-    from sklearn.linear_model import LogisticRegression
-    from sklearn.model_selection import GroupKFold, cross_val_predict
-
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--worlds", type=int, default=72)
-    found = list(evidence(parser.parse_args().worlds))
-    X = np.array([[numbers[name] for name in WEIGHTS] for numbers, _, _ in found])
-    X[:, -1] = np.clip(X[:, -1], -MARGIN_COUNTS, MARGIN_COUNTS)
-    right, world = np.array([r for _, r, _ in found]), np.array([w for _, _, w in found])
-    # Both kinds weigh the same: how often a pipeline is right is not for the verdict to assume.
-    model = LogisticRegression(C=30.0, class_weight="balanced")
-    unseen = cross_val_predict(model, X, right, groups=world, cv=GroupKFold(8), method="predict_proba")[:, 1]
-    model.fit(X, right)
-    print(
-        "weights",
-        dict(zip(WEIGHTS, model.coef_[0].round(2), strict=True)),
-        "intercept",
-        model.intercept_.round(2),
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    stored = np.array([confidence(numbers) for numbers, _, _ in found])
-    report("unseen worlds", unseen, right, world)
-    report("weights in use", stored, right, world)
-
-
-def report(name: str, p: Array, right: NDArray[np.bool_], world: NDArray[np.int64]) -> None:
-    """Print how probabilities `p` do, in all and for each kind of world."""
-    from sklearn.metrics import brier_score_loss
-
-    print(f"{name}: Brier score {brier_score_loss(right, p):.3f}")
-    every = ("all", np.ones(len(world), dtype=bool))
-    kinds = [(kind, np.array([KINDS[w % len(KINDS)] == kind for w in world])) for kind in KINDS]
-    for kind, here in (every, *kinds):
-        good, bad = p[right & here], p[~right & here]
-        print(
-            f"  {kind:9s} of {len(good):3d} right poses {np.mean(good >= 0.95):4.0%} ok, {np.mean(good < 0.5):4.0%} "
-            f"failed; of {len(bad):3d} wrong ones {np.sum(bad >= 0.95):2d} ok, {np.mean(bad < 0.5):4.0%} failed"
-        )
+    parser.add_argument("what", choices=["gather", "fit"])
+    parser.add_argument("--rows", type=Path, default=Path("runs/evidence.jsonl"))
+    parser.add_argument("--pairs", type=int, default=40, help="of each tier")
+    parser.add_argument("--workers", type=int, default=2)
+    parser.add_argument("--write", type=Path, help="write the rule as JSON")
+    options = parser.parse_args()
+    if options.what == "gather":
+        gather(options.rows, options.pairs, options.workers)
+        return
+    rows = read(options.rows)
+    report(rows, unseen(rows))
+    weights, intercept = fit(rows)
+    rule = {"weights": {k: round(w, 3) for k, w in weights.items()}, "intercept": round(intercept, 3)}
+    print(json.dumps(rule, indent=2))
+    if options.write:
+        options.write.write_text(json.dumps(rule, indent=2) + "\n")
 
 
 if __name__ == "__main__":

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import product
 from typing import Literal
 
 import numpy as np
@@ -19,7 +20,8 @@ from hybridreg.classical.voxel import VoxelGrid
 from hybridreg.matches import Correspondences, Pose
 from hybridreg.scene import Scene
 from hybridreg.stage import Stage
-from hybridreg.verdict.rivals import best_first
+from hybridreg.verdict.confidence import NEARLY
+from hybridreg.verdict.rivals import Rival, best_first, distinct
 
 Array = NDArray[np.float64]
 Side = Literal["source", "target"]
@@ -28,8 +30,13 @@ Side = Literal["source", "target"]
 _VOXEL, _ALONG_REACH = 0.5, 60.0
 # In voxels: the coarse map's cell, how far from the sensor points are used.
 _COARSE, _REACH = 3.0, 200.0
-# Degrees between yaws; peaks for each pose that is settled, as some meet; the share of the best one's score they need.
-_YAW_STEP_DEG, _PEAKS, _SHARE = 4.0, 3, 0.75
+# Degrees between yaws; the share of the best peak's score that a peak needs: along a corridor the walls outvote what
+# tells one place from another.
+_YAW_STEP_DEG, _SHARE = 4.0, 0.65
+# How far the spectra are levelled when the best pose is not plain.
+_WHITEN = (0.0, 0.75)
+# A plane that leans more than this may be the wall beside a sensor that sees little ground, degrees.
+_STEEP_DEG = 40.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,7 +50,8 @@ class BirdsEye(Stage):
     support. The height follows from the two ground planes. The others come back as `rivals`.
 
     Where a cloud shows no ground, its sensor is taken to stand upright (or on its head, if the other one does) and
-    its lowest points to be the ground; a note says so.
+    its lowest points to be the ground; a note says so. Where the ground that it shows is so steep that it may be a
+    wall, both are tried.
 
     Parameters
     ----------
@@ -60,7 +68,7 @@ class BirdsEye(Stage):
     voxel: float | None = None
     layers: tuple[float, ...] = (0.6, 2.0, 4.0, 8.0, 20.0)
     farthest: float = 120.0
-    tries: int = 5
+    tries: int = 40
 
     def __post_init__(self) -> None:
         if self.voxel is not None and not 0.0 < self.voxel < np.inf:
@@ -75,14 +83,27 @@ class BirdsEye(Stage):
     def __call__(self, scene: Scene, matches: Correspondences, rng: np.random.Generator) -> Pose:
         voxel = self.voxel or _default_voxel(scene)
         own = VoxelGrid(voxel=voxel)(scene.pair)
-        grounds = _grounds(own, scene)
-        frames = [_level_frame(g) for g in grounds]
-        views = [self._view(own, side, frame, voxel) for side, frame in zip(_SIDES, frames, strict=True)]
-        if any(len(view.filled.layer) == 0 for view in views):
+        frames = [[_level_frame(g) for g in grounds] for grounds in _grounds(own, scene)]
+        views = [
+            [self._view(own, side, frame, voxel) for frame in its]
+            for side, its in zip(_SIDES, frames, strict=True)
+        ]
+        found: list[Rival] = []
+        for i, j in product(range(len(frames[0])), range(len(frames[1]))):
+            if len(views[0][i].filled.layer) and len(views[1][j].filled.layer):
+                planar = self._planar(views[0][i], views[1][j], voxel)
+                T_target_level = se3.inverse(frames[1][j])
+                here = best_first(scene, [T_target_level @ M @ frames[0][i] for M in planar])
+                if here[0].support < NEARLY:
+                    T_level_source = _over_the_origin(frames[1][j] @ here[0].T)
+                    levelled = self._view(own, "source", T_level_source, voxel)
+                    again = self._slid(levelled, views[1][j], voxel)
+                    here += best_first(scene, [T_target_level @ M @ T_level_source for M in again])
+                found += here
+        if not found:
             scene.note("bird's-eye search: nothing stands on the ground")
             return Pose.unknown()
-        starts = [se3.inverse(frames[1]) @ M @ frames[0] for M in self._planar(views[0], views[1], voxel)]
-        return Pose.ranked([one.T for one in best_first(scene, starts)])
+        return Pose.ranked([one.T for one in distinct(scene, found)])
 
     def _view(self, own: Scene, side: Side, T_level_cloud: Array, voxel: float) -> FromAbove:
         level = getattr(own, side)
@@ -97,23 +118,49 @@ class BirdsEye(Stage):
             source,
             target,
             cell=_COARSE * voxel,
-            step_deg=_YAW_STEP_DEG,
+            yaws=np.arange(0.0, 2.0 * np.pi, np.radians(_YAW_STEP_DEG)),
             farthest=self.farthest * voxel,
-            most=_PEAKS * self.tries,
+            most=self.tries,
             share=_SHARE,
         )
         found = climb(
             source, target, peaks, cell=voxel, step_deg=0.4 * _YAW_STEP_DEG, step=0.5 * _COARSE * voxel
         )
-        return _matrices(found, self.tries)
+        return _matrices(found)
+
+    def _slid(self, source: FromAbove, target: FromAbove, voxel: float) -> list[Array]:
+        """Poses at the yaw that the views have, and half a turn from it: what lies along a street or a corridor decides
+        where, and only a fine map shows it."""
+        if len(source.filled.layer) == 0:
+            return []
+        return [
+            M
+            for whiten in _WHITEN
+            for M in _matrices(
+                sweep(
+                    source,
+                    target,
+                    cell=voxel,
+                    yaws=np.array([0.0, np.pi]),
+                    farthest=self.farthest * voxel,
+                    most=self.tries,
+                    share=0.0,
+                    whiten=whiten,
+                )
+            )
+        ]
 
 
 _SIDES: tuple[Side, Side] = ("source", "target")
 
 
-def _matrices(found: Planar, most: int) -> list[Array]:
+def _over_the_origin(T_level_cloud: Array) -> Array:
+    return se3.from_rt(T_level_cloud[:3, :3], T_level_cloud[:3, 3] * [0.0, 0.0, 1.0])
+
+
+def _matrices(found: Planar) -> list[Array]:
     poses = []
-    for yaw, shift in zip(found.yaw[:most], found.shift[:most], strict=True):
+    for yaw, shift in zip(found.yaw, found.shift, strict=True):
         T = se3.yaw(float(np.degrees(yaw)))
         T[:2, 3] = shift.real, shift.imag
         poses.append(T)
@@ -129,18 +176,24 @@ def _default_voxel(scene: Scene) -> float:
     return min(_VOXEL, float(f"{reach / _ALONG_REACH:.2g}")) or _VOXEL
 
 
-def _grounds(own: Scene, scene: Scene) -> list[Ground]:
+def _grounds(own: Scene, scene: Scene) -> list[list[Ground]]:
+    # For each cloud the ground it shows, and what it may be instead.
     found = {side: ground.find(own, side) for side in _SIDES}
+    grounds = []
     for side, other in zip(_SIDES, reversed(_SIDES), strict=True):
-        if found[side] is None:
-            known = found[other]
-            head_down = known is not None and known.up[2] < 0.0
+        shown, known = found[side], found[other]
+        head_down = known is not None and known.up[2] < -np.cos(np.radians(_STEEP_DEG))
+        assumed = _assumed(getattr(own, side).points, -1.0 if head_down else 1.0)
+        if shown is None:
             scene.note(
                 f"bird's-eye search: no ground found in the {side}; its sensor is taken to "
                 f"{'hang on its head, as the other does' if head_down else 'stand upright'}"
             )
-            found[side] = _assumed(getattr(own, side).points, -1.0 if head_down else 1.0)
-    return [g for g in found.values() if g is not None]
+            grounds.append([assumed])
+        else:
+            steep = abs(shown.up[2]) < np.cos(np.radians(_STEEP_DEG))
+            grounds.append([shown, assumed] if steep else [shown])
+    return grounds
 
 
 def _assumed(points: Array, sign: float) -> Ground:

@@ -3,8 +3,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -15,8 +15,7 @@ from hybridreg.classical.nothing import NoOverlap
 from hybridreg.matches import Correspondences, Pose
 from hybridreg.scene import Scene
 from hybridreg.stage import Stage
-from hybridreg.verdict import rivals, views, weigh
-from hybridreg.verdict.agreement import compare
+from hybridreg.verdict import rivals, support, views, weigh
 from hybridreg.verdict.confidence import NEARLY, OK
 from hybridreg.verdict.rivals import Rival
 
@@ -24,17 +23,20 @@ Array = NDArray[np.float64]
 Entry = Mapping[str, Any]
 
 _SLOTS = ("overlap", "match", "estimate")
-# Poses looked at of each entry: its own and the best of its rivals.
-_LOOKED_AT = 5
+# Poses looked at of each entry: its own and the best of its rivals; how many of these are refined at most.
+_LOOKED_AT, _REFINED = 8, 3
+# Log-odds below which a settled pose is not refined, and by which its support may fall when it is.
+_HOPELESS, _NOISE = -5.0, 1.0
 
 
 @dataclass(frozen=True, kw_only=True)
 class Candidates(Stage):
     """Try recipes in turn and return the pose that both clouds support best.
 
-    Every pose that an entry offers is settled and ranked by the verdict's own support (agreement of the surfaces that
-    both sensors looked at, less what they looked through), the best is refined and weighed with the others as its
-    rivals. Later entries are not run once the confidence is `enough`. What was not chosen comes back as `rivals`.
+    Every pose that an entry offers is settled and ranked by the verdict's own support (`hybridreg.verdict.support`),
+    the best ones are refined, and the best of these is weighed with the others as its rivals. A pose to which
+    several entries came is believed the more. Later entries are not run once the confidence is `enough`. What was
+    not chosen comes back as `rivals`.
 
     Parameters
     ----------
@@ -66,39 +68,46 @@ class Candidates(Stage):
 
     def __call__(self, scene: Scene, matches: Correspondences, rng: np.random.Generator) -> Pose:
         found: list[Rival] = []
+        for found in self.stages(scene, matches, rng):
+            if found and weigh(scene, _best_of(found)).confidence >= self.enough:
+                break
+        if not found:
+            return Pose.unknown(len(matches))
+        if found[0].support <= _HOPELESS:
+            found[0] = self._refined(scene, found[0])
+        return _best_of(found)
+
+    def stages(
+        self, scene: Scene, matches: Correspondences, rng: np.random.Generator
+    ) -> Iterator[list[Rival]]:
+        """What is found after each entry, the best supported first."""
+        found: list[Rival] = []
+        answers: list[list[Rival]] = []
         # A generator each, so that an entry's answer does not hang on those before it.
         for entry, own in zip(self.of, rng.spawn(len(self.of)), strict=True):
             pose = _pose(entry, scene, matches, own)
             if pose.found and np.isfinite(pose.T).all():
-                found = self._joined(scene, found, pose)
-                if weigh(scene, _best_of(found)).confidence >= self.enough:
-                    break
-        if not found:
-            return Pose.unknown(len(matches))
-        if not _promising(found[0]):
-            found[0] = self._refined(scene, found[0])
-        return _best_of(found)
+                offered = rivals.best_first(scene, [pose.T, *pose.rivals[: _LOOKED_AT - 1]])
+                answers.append(offered)
+                found = rivals.counted(scene, self._joined(scene, found, offered), answers)
+            yield found
 
-    def _joined(self, scene: Scene, found: list[Rival], pose: Pose) -> list[Rival]:
-        best, *others = rivals.best_first(scene, [pose.T, *pose.rivals[: _LOOKED_AT - 1]])
+    def _joined(self, scene: Scene, found: list[Rival], offered: list[Rival]) -> list[Rival]:
+        best = max(one.support for one in [*found, *offered])
         # Refining a wrong pose costs most: nothing there lets it rest, and what is nearest is far away.
-        if _promising(best) and (not found or best.support > found[0].support - NEARLY):
-            best = self._refined(scene, best)
-        return rivals.distinct(scene, [*found, best, *others])
+        near = [one for one in offered if one.support > max(best - NEARLY, _HOPELESS)][:_REFINED]
+        refined = [self._refined(scene, one) for one in near]
+        return rivals.distinct(scene, [*found, *refined, *offered[len(near) :]])
 
     def _refined(self, scene: Scene, settled: Rival) -> Rival:
         T = self.refine(scene, Pose(settled.T)).T
-        support = rivals.support(compare(*views.views(scene), T, views.spacing(scene)))
-        return Rival(T, support) if support > settled.support - NEARLY else settled
-
-
-def _promising(settled: Rival) -> bool:
-    # Hardly more was looked through than agrees; nearly all settled poses that are far off have less support.
-    return settled.support > -NEARLY
+        value = support.of(*views.views(scene), T, views.spacing(scene))
+        # Along a corridor a refinement may slide away; else it is nearer than what settled, whatever its support.
+        return Rival(T, value) if value > settled.support - _NOISE else settled
 
 
 def _best_of(found: list[Rival]) -> Pose:
-    return Pose.ranked([rival.T for rival in found])
+    return replace(Pose.ranked([rival.T for rival in found]), recipes=found[0].recipes)
 
 
 def _built(entry: Entry) -> Entry:

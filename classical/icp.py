@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -56,7 +56,7 @@ class Icp(Stage):
                 T = se3.exp(twist) @ T
                 if np.abs(twist[:3]).max() < _STILL_RAD and np.abs(twist[3:]).max() < _STILL_M:
                     break
-        return Pose(T, pose.inliers, pose.rivals)
+        return replace(pose, T=T)
 
     def _step(self, scene: Scene, T: Array, max_distance: float) -> Array | None:
         moved = se3.apply(T, scene.source.points)

@@ -14,11 +14,14 @@ from hybridreg.resources import n_threads
 
 Array = NDArray[np.float64]
 Floats = NDArray[np.float32]
+Complexes = NDArray[np.complex64]
 
 # Yaws transformed at once, and the sectors in which a place keeps a best yaw of its own (a street turned round).
 _BATCH, _SECTORS = 4, 4
 # Cells along a map; time and memory go with their square. Clouds with their sensor at the origin need about 200.
 _LONGEST = 512
+# Parts of a spectrum quieter than this share of its mean are noise, and not made louder.
+_QUIET = 0.01
 
 
 class Planar(NamedTuple):
@@ -34,10 +37,11 @@ def sweep(
     target: FromAbove,
     *,
     cell: float,
-    step_deg: float,
+    yaws: Array,
     farthest: float,
     most: int,
     share: float,
+    whiten: float = 0.0,
 ) -> Planar:
     """Peaks of the correlation of two signed maps: filled columns count +1, free ones a little below zero.
 
@@ -45,14 +49,17 @@ def sweep(
     ----------
     cell : float
         Edge of a map's cell, metres.
-    step_deg : float
-        Between yaws.
+    yaws : (k,)
+        Radians, rising from 0 to below 2 pi.
     farthest : float
         Largest shift, metres.
     most : int
         Peaks returned, at most.
     share : float
         Of the best one's score that a peak needs.
+    whiten : float in [0, 1]
+        How far the spectra are levelled (1 is phase correlation). Long walls agree with themselves wherever they are
+        slid to; levelled, they count as little as what is short and stands alone.
 
     Raises
     ------
@@ -71,12 +78,11 @@ def sweep(
     place: Array = cell * np.fft.fftfreq(n, 1.0 / n).astype(np.float64)
     beyond = np.hypot(place[:, None], place) > farthest
     spectrum = fft.rfft2(blurred(signed(target, 1.0, n, cell)), workers=n_threads())
-    yaws = np.arange(0.0, 2.0 * np.pi, np.radians(step_deg))
     best = np.full((_SECTORS, n, n), -np.inf, dtype=np.float32)
     at = np.zeros((_SECTORS, n, n))
     for batch in np.array_split(yaws, -(-len(yaws) // _BATCH)):
         turned = np.stack([signed(source, np.exp(1j * yaw), n, cell) for yaw in batch])
-        product = (np.conj(fft.rfft2(turned, workers=n_threads())) * spectrum).sum(axis=1)
+        product = _product(fft.rfft2(turned, workers=n_threads()), spectrum, whiten)
         for yaw, score in zip(batch, fft.irfft2(product, s=(n, n), workers=n_threads()), strict=True):
             sector = int(_SECTORS * yaw / (2.0 * np.pi))
             better = score > best[sector]
@@ -84,6 +90,15 @@ def sweep(
             at[sector][better] = yaw
     best[:, beyond] = -np.inf
     return _peaks(best, at, place, most, share)
+
+
+def _product(source: Complexes, target: Complexes, whiten: float) -> Complexes:
+    # Of spectra (yaws, layers, n, m) and (layers, n, m), summed over the layers.
+    product: Complexes = (np.conj(source) * target).sum(axis=1)
+    if whiten == 0.0:
+        return product
+    loud = np.sqrt((np.abs(source) ** 2).sum(axis=1) * (np.abs(target) ** 2).sum(axis=0))
+    return product / np.maximum(loud, _QUIET * loud.mean(axis=(1, 2), keepdims=True)) ** whiten
 
 
 def _extent(view: FromAbove) -> float:

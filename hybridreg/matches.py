@@ -97,12 +97,15 @@ class Pose:
         Other poses that the data nearly supports, best first.
     found : bool
         False where the stage had nothing to work with and T is only a placeholder (the identity).
+    recipes : int
+        Methods that came to T independently of one another.
     """
 
     T: Array
     inliers: NDArray[np.bool_] | None = None
     rivals: Array = field(default_factory=lambda: np.zeros((0, 4, 4)))
     found: bool = True
+    recipes: int = 1
 
     @classmethod
     def ranked(cls, poses: Sequence[Array], inliers: NDArray[np.bool_] | None = None) -> Pose:

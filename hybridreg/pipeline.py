@@ -6,7 +6,7 @@ from __future__ import annotations
 import os
 import zlib
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -192,4 +192,4 @@ def _proper(pose: Pose) -> Pose:
         return Pose.unknown(0 if pose.inliers is None else len(pose.inliers))
     T[:3, :3] = project(T[:3, :3])
     T[3] = [0.0, 0.0, 0.0, 1.0]
-    return Pose(T, pose.inliers, pose.rivals, pose.found)
+    return replace(pose, T=T)

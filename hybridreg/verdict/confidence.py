@@ -1,10 +1,9 @@
 # SPDX-License-Identifier: MIT
 """From evidence to a probability that the pose is right.
 
-A logistic rule on four numbers. Its weights are those of a logistic regression on simulated scenes only (streets,
-crossings, yards, woods, rooms and corridors under six kinds of sensor; right poses against half turns, slides, the
-best of several random starts, and clouds of different places), rounded: `python -m benchmarks.verdict_weights`.
-A later model, calibrated on more data, takes the same evidence.
+Either the pose is right, or its best rival is, or none: each by the odds that its own evidence gives it
+(`hybridreg.verdict.support`), none by odds of one. So two poses that explain the data alike share the probability,
+however well they explain it, and a pose without rivals keeps its own.
 """
 
 from __future__ import annotations
@@ -17,25 +16,17 @@ import numpy as np
 Word = Literal["ok", "doubtful", "failed"]
 
 OK, FAILED = 0.95, 0.5
-# Per unit of each number; all four are shares between 0 and 1.
-WEIGHTS = {"agreement_least": 4.8, "agreement_middle": 0.6, "looked_through": -10.7, "rival_margin": -6.5}
-INTERCEPT = -0.9
-# A rival that is far behind, or far ahead, says no more than one that is this far. The simulated scenes, divided by
-# scene for cross-validation, were told apart best with 0.3 to 0.5.
-MARGIN_COUNTS = 0.4
-
-# A rival explains the data nearly as well when its support comes within this of the pose's.
-NEARLY = 0.1
+# A rival explains the data nearly as well when it alone keeps the pose from "ok": log-odds.
+NEARLY = float(np.log(OK / (1.0 - OK)))
+# The rival margin where there is no rival to compare with, and the farthest that one counts.
+NO_RIVAL = -20.0
 
 
 def confidence(evidence: Mapping[str, float]) -> float:
-    """Probability in (0, 1) that the pose is right."""
-    margin = float(np.clip(evidence["rival_margin"], -MARGIN_COUNTS, MARGIN_COUNTS))
-    numbers = {**evidence, "rival_margin": margin}
-    score = INTERCEPT + sum(weight * numbers[name] for name, weight in WEIGHTS.items())
-    # Two poses that explain the data alike share the probability, however well they explain it.
-    ceiling = 0.5 + 0.5 * float(np.clip(-margin / NEARLY, 0.0, 1.0))
-    return min(float(1.0 / (1.0 + np.exp(-score))), ceiling)
+    """Probability in (0, 1) that the pose is right, from its `support` and `rival_margin`."""
+    margin = max(evidence["rival_margin"], NO_RIVAL)
+    against = np.exp([-evidence["support"], margin]).sum()
+    return float(1.0 / (1.0 + against))
 
 
 def word(probability: float) -> Word:

@@ -13,18 +13,15 @@ from hybridreg import se3
 from hybridreg.fitness import Fitness, measure
 from hybridreg.matches import Correspondences, Pose
 from hybridreg.scene import Scene
-from hybridreg.verdict import information, rivals, views
+from hybridreg.verdict import information, rivals, support, views
 from hybridreg.verdict.agreement import Agreement, OneWay, compare
-from hybridreg.verdict.confidence import NEARLY, Word, confidence, word
+from hybridreg.verdict.confidence import NEARLY, NO_RIVAL, Word, confidence, word
 from hybridreg.verdict.information import Information
 from hybridreg.verdict.rivals import Rival
 from hybridreg.verdict.views import View
 from hybridreg.verdict.words import reasons
 
 Array = NDArray[np.float64]
-
-# The rival margin where there is no rival to compare with.
-_NO_RIVAL = -1.0
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -117,7 +114,7 @@ def weigh(scene: Scene, pose: Pose) -> Weighed:
     """
     # Rounded, as the pipeline makes the rotation of a pose exact to the last digit.
     key = tuple(np.round([pose.T, *pose.rivals], 9).ravel())
-    return scene.shared(("weighed", pose.found, key), lambda: _weigh(scene, pose))
+    return scene.shared(("weighed", pose.found, pose.recipes, key), lambda: _weigh(scene, pose))
 
 
 def _weigh(scene: Scene, pose: Pose) -> Weighed:
@@ -126,14 +123,14 @@ def _weigh(scene: Scene, pose: Pose) -> Weighed:
     agreement = compare(source, target, pose.T, spacing)
     held = information.measure(agreement, target)
     found = rivals.find(source, target, pose.T, agreement, held, pose.rivals, spacing) if pose.found else []
-    evidence = evidence_of(agreement, held, found, target)
+    evidence = evidence_of(agreement, held, found, target, pose.recipes)
     return Weighed(
         agreement=agreement, held=held, rivals=found, evidence=evidence, confidence=confidence(evidence)
     )
 
 
 def evidence_of(
-    agreement: Agreement, held: Information, found: list[Rival], target: View
+    agreement: Agreement, held: Information, found: list[Rival], target: View, recipes: int
 ) -> dict[str, float]:
     """The numbers behind a verdict; shares lie between 0 and 1.
 
@@ -148,19 +145,16 @@ def evidence_of(
     normals : mean cosine between the normals of points and their neighbours
     inlier_rmse : of the agreeing points to the other cloud's planes, metres
     weakest : smallest eigenvalue of the information per point, at most 1/3
-    support, rival_margin : of the pose, and how far the best rival's lies above it (-1 without rivals)
+    recipes : methods that came to the pose independently of one another
+    support : log-odds that the pose is right, were there no other
+    rival_margin : how far the best rival's support lies above it (-20 without rivals)
     """
-    support = rivals.support(agreement)
-    least, middle, most = np.sort(agreement.shares)
+    own = support.numbers(agreement, held, recipes)
+    of_pose = support.support(own)
     evidence = {
-        "agreement_least": least,
-        "agreement_middle": middle,
-        "agreement_most": most,
-        "looked_least": agreement.looked.min(),
-        "looked_through": agreement.looked_through,
-        "weakest": held.weakest,
-        "support": support,
-        "rival_margin": found[0].support - support if found else _NO_RIVAL,
+        **own,
+        "support": of_pose,
+        "rival_margin": found[0].support - of_pose if found else NO_RIVAL,
         **_surfaces(agreement.source, target),
     }
     for name, way in (("source", agreement.source), ("target", agreement.target)):

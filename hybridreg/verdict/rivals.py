@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from hybridreg import se3
 from hybridreg.scene import Scene
-from hybridreg.verdict import views
-from hybridreg.verdict.agreement import Agreement, compare
+from hybridreg.verdict import support, views
+from hybridreg.verdict.agreement import Agreement
 from hybridreg.verdict.information import Information
 from hybridreg.verdict.settle import settle
 from hybridreg.verdict.views import View
@@ -25,28 +25,30 @@ _OFFERED, _SETTLED, _CLOSELY = 4, 6, 3
 _SLIDES = (-16.0, -8.0, 8.0, 16.0)
 # Nearer than this (spacings, degrees) a rival is the pose itself.
 _APART, _TURNED = 3.0, 5.0
-_QUICK, _CLOSE = 5, 2
+_QUICK, _CLOSE, _ROUGHLY = 5, 2, 3
+# Best of many starts that are looked at closely.
+_KEPT = 8
 
 
 class Rival(NamedTuple):
-    """A pose (4, 4) and its support."""
+    """A pose (4, 4), its support (log-odds), and how many recipes came to it."""
 
     T: Array
     support: float
+    recipes: int = 1
 
 
-def support(agreement: Agreement) -> float:
-    """One number to rank poses by, at most 1: agreement along the axis where it is least, less the share that the
-    sensors looked through. Both were about as telling in simulated scenes (`confidence.py`)."""
-    return float(agreement.shares.min() - agreement.looked_through)
-
-
-def best_first(scene: Scene, starts: Iterable[Array]) -> list[Rival]:
-    """Each of `starts` (4, 4) where it fits best, the best supported first; of those that meet, one."""
+def best_first(scene: Scene, starts: Sequence[Array]) -> list[Rival]:
+    """The best supported of `starts` (4, 4), at most eight, each where it fits best; of those that meet, one."""
     source, target = views.views(scene)
     spacing = views.spacing(scene)
-    settled = [settle(source, target, start, spacing) for start in starts]
-    return distinct(scene, [Rival(T, support(compare(source, target, T, spacing))) for T in settled])
+
+    def settled(start: Array, every: int) -> Rival:
+        T = settle(source, target, start, spacing, every=3 * every)
+        return Rival(T, support.of(source, target, T, spacing, every))
+
+    quickly = distinct(scene, [settled(start, _ROUGHLY) for start in starts])
+    return distinct(scene, [settled(rival.T, 1) for rival in quickly[:_KEPT]])
 
 
 def distinct(scene: Scene, found: Iterable[Rival]) -> list[Rival]:
@@ -58,6 +60,19 @@ def distinct(scene: Scene, found: Iterable[Rival]) -> list[Rival]:
         if all(differs(other.T, one.T, centre, spacing) for other in kept):
             kept.append(one)
     return kept
+
+
+def counted(scene: Scene, found: Iterable[Rival], answers: Iterable[Iterable[Rival]]) -> list[Rival]:
+    """The same poses, the best supported first, with the number of recipes whose `answers` hold them."""
+    middle, spacing = views.views(scene)[0].points.mean(axis=0, keepdims=True), views.spacing(scene)
+
+    def told(one: Rival) -> Rival:
+        centre = se3.apply(one.T, middle)[0]
+        came = [any(not differs(other.T, one.T, centre, spacing) for other in answer) for answer in answers]
+        n = max(sum(came), 1)
+        return Rival(one.T, one.support + support.found_by(n) - support.found_by(one.recipes), n)
+
+    return sorted(map(told, found), key=lambda rival: -rival.support)
 
 
 def find(
@@ -82,13 +97,13 @@ def find(
         *_slid(T, agreement, spacing),
     ]
     guesses = [guess for guess in guesses if differs(guess, T, information.centre, spacing)]
-    promising = sorted(guesses, key=lambda G: -support(compare(source, target, G, spacing, every=_QUICK)))
+    promising = sorted(guesses, key=lambda G: -support.of(source, target, G, spacing, every=_QUICK))
     found: list[Rival] = []
     for guess in promising[:_SETTLED]:
         G = settle(source, target, guess, spacing)
         # Guesses that come back to the pose are no rivals, and must not hide those behind them.
         if differs(G, T, information.centre, spacing):
-            found.append(Rival(G, support(compare(source, target, G, spacing, every=_CLOSE))))
+            found.append(Rival(G, support.of(source, target, G, spacing, every=_CLOSE)))
         if len(found) == _CLOSELY:
             break
     return sorted(found, key=lambda rival: -rival.support)

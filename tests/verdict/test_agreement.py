@@ -12,7 +12,6 @@ from made_places import Made
 from hybridreg import se3
 from hybridreg.verdict import views
 from hybridreg.verdict.agreement import Agreement, compare, main_axes
-from hybridreg.verdict.rivals import support
 
 SHIFT = se3.from_rt(np.eye(3), np.array([3.0, 0.0, 0.0]))
 
@@ -79,7 +78,6 @@ def test_few_points_count_for_little() -> None:
         through=np.zeros(3),
     )
     assert made.shares == pytest.approx([900 / 1020, 90 / 120, 5 / 25])
-    assert support(made) == pytest.approx(0.2)
 
 
 def test_without_a_viewpoint_nothing_is_looked_through(crossing: Made) -> None:

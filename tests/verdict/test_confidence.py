@@ -1,33 +1,81 @@
 # SPDX-License-Identifier: MIT
 from __future__ import annotations
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hybridreg.verdict.confidence import FAILED, NEARLY, OK, WEIGHTS, confidence, word
+from hybridreg.verdict.confidence import FAILED, NEARLY, NO_RIVAL, OK, confidence, word
+from hybridreg.verdict.support import found_by, model, support, terms
 
 share = st.floats(0.0, 1.0)
-evidence = st.fixed_dictionaries({**dict.fromkeys(WEIGHTS, share), "rival_margin": st.floats(-1.5, 1.5)})
+own = st.fixed_dictionaries(
+    {
+        "agreement_least": share,
+        "agreement_middle": share,
+        "looked_through": share,
+        "weakest": st.floats(0.0, 1.0 / 3.0),
+        "recipes": st.integers(1, 5),
+    }
+)
+log_odds = st.floats(-15.0, 15.0)
 
 
-@given(evidence, st.sampled_from(sorted(WEIGHTS)), st.floats(0.0, 0.5))
-def test_more_agreement_and_fewer_objections_never_lower_it(
+def believed(pose: float, rival: float) -> float:
+    return confidence({"support": pose, "rival_margin": rival - pose})
+
+
+@given(
+    own,
+    st.sampled_from(["agreement_least", "agreement_middle", "looked_through", "weakest", "recipes"]),
+    share,
+)
+def test_more_agreement_and_fewer_objections_never_lower_the_support(
     numbers: dict[str, float], name: str, step: float
 ) -> None:
-    better = {**numbers, name: numbers[name] + (step if WEIGHTS[name] > 0 else -step)}
-    assert 0.0 <= confidence(numbers) <= confidence(better) <= 1.0
+    against = name == "looked_through"
+    better = {**numbers, name: numbers[name] + (-step if against else 1 if name == "recipes" else step)}
+    assert support(better) >= support(numbers)
 
 
-def test_other_evidence_is_left_aside() -> None:
-    numbers = dict.fromkeys(WEIGHTS, 0.2)
-    assert confidence({**numbers, "normals": 0.9}) == confidence(numbers)
+def test_the_rule_weighs_the_terms_and_nothing_else() -> None:
+    numbers = {
+        "agreement_least": 0.5,
+        "agreement_middle": 0.6,
+        "looked_through": 0.1,
+        "weakest": 0.02,
+        "recipes": 1,
+    }
+    assert set(model().weights) == set(terms(numbers))
+    assert support({**numbers, "normals": 0.9}) == support(numbers)
 
 
-@given(evidence)
-def test_two_poses_that_explain_the_data_alike_are_never_ok(numbers: dict[str, float]) -> None:
-    assert confidence({**numbers, "rival_margin": 0.0}) <= 0.5
-    assert word(confidence({**numbers, "rival_margin": -0.8 * NEARLY})) != "ok"
+@given(own)
+def test_each_recipe_that_came_to_a_pose_adds_to_its_support(numbers: dict[str, float]) -> None:
+    one, three = ({**numbers, "recipes": n} for n in (1, 3))
+    assert support(three) - support(one) == pytest.approx(found_by(3) - found_by(1))
+    assert found_by(1) == 0.0 < found_by(2) < found_by(3)
+
+
+@given(log_odds, log_odds, st.floats(0.0, 5.0))
+def test_a_better_pose_or_a_worse_rival_never_lowers_the_confidence(
+    pose: float, rival: float, step: float
+) -> None:
+    assert 0.0 < believed(pose, rival) <= believed(pose + step, rival) < 1.0
+    assert believed(pose, rival) <= believed(pose, rival - step)
+
+
+@given(log_odds)
+def test_two_poses_that_explain_the_data_alike_are_never_ok(pose: float) -> None:
+    assert believed(pose, pose) <= 0.5
+    assert word(believed(pose, pose - 0.8 * NEARLY)) != "ok"
+
+
+@given(log_odds)
+def test_without_a_rival_the_confidence_is_that_of_the_support(pose: float) -> None:
+    alone = confidence({"support": pose, "rival_margin": NO_RIVAL})
+    assert alone == pytest.approx(1.0 / (1.0 + np.exp(-pose)), abs=1e-6)
 
 
 @pytest.mark.parametrize(

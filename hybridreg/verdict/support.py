@@ -1,0 +1,81 @@
+# SPDX-License-Identifier: MIT
+"""How far both clouds support one pose, by itself: the log-odds that it is right."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from functools import lru_cache
+from importlib.resources import files
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hybridreg.verdict import information
+from hybridreg.verdict.agreement import Agreement, compare
+from hybridreg.verdict.information import Information
+from hybridreg.verdict.views import View
+
+Array = NDArray[np.float64]
+
+# Below this no direction is held, and how little it is held says no more.
+_UNHELD = 1e-4
+
+
+class Model(NamedTuple):
+    """A logistic rule: one weight for each of the `terms` of a pose."""
+
+    weights: dict[str, float]
+    intercept: float
+
+
+@lru_cache(maxsize=1)
+def model() -> Model:
+    """The rule in `model.json`, which `python -m benchmarks.verdict_weights` writes."""
+    stored = json.loads(files("hybridreg.verdict").joinpath("model.json").read_text())
+    return Model(stored["weights"], stored["intercept"])
+
+
+def support(evidence: Mapping[str, float]) -> float:
+    """Log-odds that a pose with this evidence (`numbers`) is right, were there no other pose."""
+    weights, intercept = model()
+    told = terms(evidence)
+    return intercept + sum(weight * told[name] for name, weight in weights.items())
+
+
+def terms(evidence: Mapping[str, float]) -> dict[str, float]:
+    """What the rule weighs: shares as they are, information and number of recipes by their logarithm."""
+    return {
+        "agreement_least": evidence["agreement_least"],
+        "agreement_middle": evidence["agreement_middle"],
+        "looked_through": evidence["looked_through"],
+        "log_weakest": float(np.log10(evidence["weakest"] + _UNHELD)),
+        "log_recipes": float(np.log(evidence["recipes"])),
+    }
+
+
+def found_by(recipes: int) -> float:
+    """What it adds to a pose's support that so many recipes came to it."""
+    return model().weights["log_recipes"] * float(np.log(recipes))
+
+
+def numbers(agreement: Agreement, held: Information, recipes: int = 1) -> dict[str, float]:
+    """What tells of one pose by itself; see `hybridreg.verdict.judgement.evidence_of`."""
+    least, middle, most = np.sort(agreement.shares)
+    found = {
+        "agreement_least": least,
+        "agreement_middle": middle,
+        "agreement_most": most,
+        "looked_least": agreement.looked.min(),
+        "looked_through": agreement.looked_through,
+        "weakest": held.weakest,
+        "recipes": recipes,
+    }
+    return {name: float(value) for name, value in found.items()}
+
+
+def of(source: View, target: View, T_target_source: Array, spacing: float, every: int = 1) -> float:
+    """Support of a pose (4, 4), from `every` so-many-th of the asked points."""
+    agreement = compare(source, target, T_target_source, spacing, every=every)
+    return support(numbers(agreement, information.measure(agreement, target)))
