@@ -160,8 +160,8 @@ class MatchingConfig:
     """Superpoint and point matching (methods 7, 8).
 
     The last three are ours, at inference only, and off by default, as published: fine points vote for pairs of
-    superpoints and matches are weighed by how unique they are; matches below ``uniqueness`` and those that do not move
-    with the others are left out.
+    superpoints, a match's weight is the geometric mean of its assignment and of how unique it is, and matches below
+    ``uniqueness`` and those that do not move with the others are left out.
     """
 
     superpoint_matches: int = 256
