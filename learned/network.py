@@ -233,7 +233,9 @@ class RegistrationNetwork(nn.Module):
         matches = gather_matches(blocks, encoding.target.points, encoding.source.points, config)
         if similarity is not None:
             unique = similarity.uniqueness(matches.target_index, matches.source_index)
-            matches = replace(matches, weight=(matches.weight * unique).sqrt()).only(unique > config.uniqueness)
+            matches = replace(matches, weight=(matches.weight * unique).sqrt()).only(
+                unique > config.uniqueness
+            )
         if config.consistency is not None:
             found = (matches.target, matches.source, matches.weight)
             matches = matches.only(consistent(*found, config.consistency))
