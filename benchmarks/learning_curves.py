@@ -51,7 +51,7 @@ def draw(figure: Any, chosen: list[Path]) -> None:
             steps, values = curve(log, name)
             if steps and any(values):
                 above.plot(steps, smoothed(values), color=colour, label=name)
-        above.set(title=run.name, yscale="log", ylabel="loss")
+        above.set(title=run.name, ylabel="loss")
         for name, colour in zip(FOUND, COLOURS, strict=True):
             for title, style in (("near", "-"), ("mid", "--"), ("far", ":")):
                 steps, values = curve([row for row in validation if row["title"] == title], name)

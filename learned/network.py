@@ -166,12 +166,24 @@ class RegistrationNetwork(nn.Module):
         return F.normalize(target, dim=1), F.normalize(source, dim=1)
 
     def match(
-        self, encoding: Encoding, kept: tuple[Kept, Kept], features: tuple[Tensor, Tensor]
+        self,
+        encoding: Encoding,
+        kept: tuple[Kept, Kept],
+        features: tuple[Tensor, Tensor],
+        *,
+        filtered: bool = True,
     ) -> tuple[SuperpointMatches, PointMatches]:
-        """Superpoint and point matches of the kept superpoints with their attended features."""
+        """Superpoint and point matches of the kept superpoints with their attended features.
+
+        ``filtered`` false keeps matches that do not move with the others, whatever the configuration says.
+        """
         similarity = self.compare_points(encoding, kept)
         superpoints = self.match_superpoints(encoding, kept, features, similarity)
-        return superpoints, self.match_points(encoding, superpoints, similarity)
+        matches = self.match_points(encoding, superpoints, similarity)
+        reach = self.config.matching.consistency
+        if filtered and reach is not None:
+            matches = matches.only(consistent(matches.target, matches.source, matches.weight, reach))
+        return superpoints, matches
 
     def compare_points(self, encoding: Encoding, kept: tuple[Kept, Kept]) -> PointSimilarity | None:
         """The fine points of the kept superpoints held against each other; None where that is not wanted."""
@@ -226,7 +238,7 @@ class RegistrationNetwork(nn.Module):
     def match_points(
         self, encoding: Encoding, superpoints: SuperpointMatches, similarity: PointSimilarity | None = None
     ) -> PointMatches:
-        """Point correspondences of the matched superpoints' patches, those that are unique and move as one."""
+        """Point correspondences of the matched superpoints' patches, those that are unique enough."""
         config = self.config.matching
         chunks = size_chunks(self.pair_up(encoding, superpoints.target, superpoints.source))
         blocks = [(chunk, self.assign(encoding, chunk, config.sinkhorn_form)) for chunk in chunks]
@@ -236,9 +248,6 @@ class RegistrationNetwork(nn.Module):
             matches = replace(matches, weight=(matches.weight * unique).sqrt()).only(
                 unique > config.uniqueness
             )
-        if config.consistency is not None:
-            found = (matches.target, matches.source, matches.weight)
-            matches = matches.only(consistent(*found, config.consistency))
         return matches
 
 

@@ -24,9 +24,13 @@ class NetworkMatcher(NetworkStage):
     min_overlap : float in [0, 1] or None
         Superpoints with a lower probability of overlap are left out, unless too few would remain. None takes
         the threshold that the network was trained with.
+    filtered : bool
+        Leave out matches that do not move with the others, where the network's configuration has a distance for that
+        (`MatchingConfig.consistency`). Without it the matches are what the features alone say.
     """
 
     min_overlap: float | None = None
+    filtered: bool = True
 
     gives: ClassVar[frozenset[str]] = frozenset({"matches", "group"})
     parts: ClassVar[frozenset[str]] = frozenset({"backbone", "transformer"})
@@ -46,7 +50,7 @@ class NetworkMatcher(NetworkStage):
         with torch.inference_mode():
             kept = keep(scene, overlap, encoding, network.config, self.min_overlap)
             features = network.attend(encoding, kept)
-            _, matches = network.match(encoding, kept, features)
+            _, matches = network.match(encoding, kept, features, filtered=self.filtered)
         return _correspondences(matches, network)
 
 
