@@ -278,6 +278,11 @@ def test_votes_and_filters_only_leave_matches_out(network: RegistrationNetwork, 
             network.config = replace(plain, matching=config)
             with torch.no_grad():
                 found.append(network(batch))
+                output = found[-1]
+                _, all_matches = network.match(
+                    output.encoding, output.kept, output.node_features, filtered=False
+                )
+            assert 0 < len(output.matches) < len(all_matches)
     finally:
         network.config = plain
     loose, tight = found
