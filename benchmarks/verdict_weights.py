@@ -25,6 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import hybridreg as hr
+from benchmarks.calibration import draw
 from benchmarks.made_sights import sight
 from hybridreg.data import open_dataset
 from hybridreg.eval import metrics
@@ -195,12 +196,16 @@ def main() -> None:
     parser.add_argument("--pairs", type=int, default=40, help="of each tier")
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--write", type=Path, help="write the rule as JSON")
+    parser.add_argument("--picture", type=Path, help="draw the reliability curve of the five folds")
     options = parser.parse_args()
     if options.what == "gather":
         gather(options.rows, options.pairs, options.workers)
         return
     rows = read(options.rows)
-    report(rows, unseen(rows))
+    p = unseen(rows)
+    report(rows, p)
+    if options.picture:
+        draw(p, np.array([row["right"] for row in rows]), options.picture)
     weights, intercept = fit(rows)
     rule = {"weights": {k: round(w, 3) for k, w in weights.items()}, "intercept": round(intercept, 3)}
     print(json.dumps(rule, indent=2))

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product
 from typing import Literal
@@ -83,27 +84,31 @@ class BirdsEye(Stage):
     def __call__(self, scene: Scene, matches: Correspondences, rng: np.random.Generator) -> Pose:
         voxel = self.voxel or _default_voxel(scene)
         own = VoxelGrid(voxel=voxel)(scene.pair)
-        frames = [[_level_frame(g) for g in grounds] for grounds in _grounds(own, scene)]
-        views = [
-            [self._view(own, side, frame, voxel) for frame in its]
-            for side, its in zip(_SIDES, frames, strict=True)
+        found = [
+            rival
+            for frames in product(*_frames(own, scene))
+            for rival in self._laid(scene, own, frames, voxel)
         ]
-        found: list[Rival] = []
-        for i, j in product(range(len(frames[0])), range(len(frames[1]))):
-            if len(views[0][i].filled.layer) and len(views[1][j].filled.layer):
-                planar = self._planar(views[0][i], views[1][j], voxel)
-                T_target_level = se3.inverse(frames[1][j])
-                here = best_first(scene, [T_target_level @ M @ frames[0][i] for M in planar])
-                if here[0].support < NEARLY:
-                    T_level_source = _over_the_origin(frames[1][j] @ here[0].T)
-                    levelled = self._view(own, "source", T_level_source, voxel)
-                    again = self._slid(levelled, views[1][j], voxel)
-                    here += best_first(scene, [T_target_level @ M @ T_level_source for M in again])
-                found += here
         if not found:
             scene.note("bird's-eye search: nothing stands on the ground")
             return Pose.unknown()
         return Pose.ranked([one.T for one in distinct(scene, found)])
+
+    def _laid(self, scene: Scene, own: Scene, frames: Sequence[Array], voxel: float) -> list[Rival]:
+        # The best poses where each cloud is levelled by one frame (T_level_source, T_level_target).
+        T_level_source, T_level_target = frames
+        source, target = (self._view(own, s, T, voxel) for s, T in zip(_SIDES, frames, strict=True))
+        if len(source.filled.layer) == 0 or len(target.filled.layer) == 0:
+            return []
+        T_target_level = se3.inverse(T_level_target)
+        planar = self._planar(source, target, voxel)
+        found = best_first(scene, [T_target_level @ M @ T_level_source for M in planar])
+        if not found or found[0].support >= NEARLY:
+            return found
+        # Levelled by the best pose, both clouds lie truer than by their grounds.
+        T_level_source = _over_the_origin(T_level_target @ found[0].T)
+        again = self._slid(self._view(own, "source", T_level_source, voxel), target, voxel)
+        return found + best_first(scene, [T_target_level @ M @ T_level_source for M in again])
 
     def _view(self, own: Scene, side: Side, T_level_cloud: Array, voxel: float) -> FromAbove:
         level = getattr(own, side)
@@ -176,24 +181,24 @@ def _default_voxel(scene: Scene) -> float:
     return min(_VOXEL, float(f"{reach / _ALONG_REACH:.2g}")) or _VOXEL
 
 
-def _grounds(own: Scene, scene: Scene) -> list[list[Ground]]:
-    # For each cloud the ground it shows, and what it may be instead.
+def _frames(own: Scene, scene: Scene) -> list[list[Array]]:
+    # For each cloud what levels it by the ground it shows, and by what may be the ground instead.
     found = {side: ground.find(own, side) for side in _SIDES}
-    grounds = []
+    frames = []
     for side, other in zip(_SIDES, reversed(_SIDES), strict=True):
         shown, known = found[side], found[other]
         head_down = known is not None and known.up[2] < -np.cos(np.radians(_STEEP_DEG))
-        assumed = _assumed(getattr(own, side).points, -1.0 if head_down else 1.0)
+        assumed = _level_frame(_assumed(getattr(own, side).points, -1.0 if head_down else 1.0))
         if shown is None:
             scene.note(
                 f"bird's-eye search: no ground found in the {side}; its sensor is taken to "
                 f"{'hang on its head, as the other does' if head_down else 'stand upright'}"
             )
-            grounds.append([assumed])
+            frames.append([assumed])
         else:
             steep = abs(shown.up[2]) < np.cos(np.radians(_STEEP_DEG))
-            grounds.append([shown, assumed] if steep else [shown])
-    return grounds
+            frames.append([_level_frame(shown), assumed] if steep else [_level_frame(shown)])
+    return frames
 
 
 def _assumed(points: Array, sign: float) -> Ground:

@@ -76,3 +76,13 @@ def test_gicp_keeps_the_start_rather_than_lose_overlap(courtyard_scene: tuple[Sc
     assert np.array_equal(not_worse(scene, Pose(truth), slid).T, truth)
     assert np.array_equal(not_worse(scene, Pose(slid), truth).T, truth)
     assert np.array_equal(not_worse(scene, Pose(truth), np.full((4, 4), np.nan)).T, truth)
+
+
+@pytest.mark.parametrize("stage", [hr.Icp(), hr.Gicp()])
+def test_a_refined_pose_remembers_how_it_was_found(
+    stage: hr.Icp | hr.Gicp, courtyard_scene: tuple[Scene, np.ndarray]
+) -> None:
+    scene, truth = courtyard_scene
+    found = stage(scene, Pose(truth, rivals=np.eye(4)[None], recipes=3))
+    assert found.recipes == 3
+    assert len(found.rivals) == 1
