@@ -116,11 +116,11 @@ def check(T: Any, name: str = "T", tolerance: float = 1e-4) -> Array:
             f"{name}: the last row is {matrix[3]}, expected [0 0 0 1]; is the matrix transposed?"
         )
     with np.errstate(over="ignore", invalid="ignore"):
-        error = float(np.abs(matrix[:3, :3] @ matrix[:3, :3].T - np.eye(3)).max())
+        off = float(np.abs(matrix[:3, :3] @ matrix[:3, :3].T - np.eye(3)).max())
         determinant = float(np.linalg.det(matrix[:3, :3]))
-    if not error <= tolerance or determinant < 0:
+    if not off <= tolerance or determinant < 0:
         raise ValueError(
-            f"{name}: the upper left 3x3 block is no rotation (R R^T is off by {error:.2g}, "
+            f"{name}: the upper left 3x3 block is no rotation (R R^T is off by {off:.2g}, "
             f"determinant {determinant:.3g}); remove scale or reflection"
         )
     return matrix

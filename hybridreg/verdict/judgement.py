@@ -158,11 +158,11 @@ def evidence_of(
         **_surfaces(agreement.source, target),
     }
     for name, way in (("source", agreement.source), ("target", agreement.target)):
-        evidence[f"visible_{name}"] = np.mean(way.looked)
-        evidence[f"hidden_{name}"] = np.mean(way.hidden)
+        evidence[f"visible_{name}"] = float(np.mean(way.looked))
+        evidence[f"hidden_{name}"] = float(np.mean(way.hidden))
         evidence[f"looked_through_{name}"] = _share(way.free, way.looked)
         evidence[f"fitness_visible_{name}"] = _share(way.covered & way.looked, way.looked)
-    return {name: float(value) for name, value in evidence.items()}
+    return evidence
 
 
 def _surfaces(way: OneWay, target: View) -> dict[str, float]:
