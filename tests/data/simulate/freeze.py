@@ -76,8 +76,11 @@ def _processor() -> str:
         lines = Path("/proc/cpuinfo").read_text().splitlines()
     except OSError:
         lines = []
-    named = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
-    return f"{platform.machine()} {named[0] if named else platform.processor()}"
+    told = {line.partition(":")[0].strip(): line.partition(":")[2].split() for line in lines}
+    # Processors of one name differ in their vector units, and ray casters choose their code by these.
+    units = [flag for flag in told.get("flags", []) if flag.startswith(("avx", "amx", "fma"))]
+    named = told.get("model name") or [platform.processor()]
+    return " ".join([platform.machine(), *named, *sorted(units)])
 
 
 def _installed(name: str) -> str:

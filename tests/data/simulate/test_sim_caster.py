@@ -70,8 +70,9 @@ def test_open3d_and_embreex_agree(rays: np.ndarray) -> None:
     rays = np.concatenate([np.zeros_like(rays), rays], axis=1)
     casters = EmbreexCaster(mesh), Open3dCaster(mesh)
     (t_one, face_one), (t_other, face_other) = (caster.cast(rays) for caster in casters)
-    # To the bit: what is drawn must not hang on which of the two a machine has.
-    assert (t_one == t_other).mean() > 0.999
+    # What is drawn must not hang on which of the two a machine has. To the bit they agree only where both choose code
+    # for the same vector units: one of them may know wider ones than the other.
+    assert np.isclose(t_one, t_other, rtol=1e-6, atol=0.0).mean() > 0.999
     assert (face_one == face_other).mean() > 0.999
     assert face_one.dtype == face_other.dtype == np.int32
     assert (face_one == -1).any()
