@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 
@@ -17,7 +18,7 @@ def positive(stage: Any, *names: str) -> None:
     """
     for name in names:
         value = getattr(stage, name)
-        items = value if isinstance(value, (tuple, list)) else (value,)
+        items = _items(value)
         if value is not None and not (items and all(0.0 < item < math.inf for item in items)):
             raise ValueError(f"{name}={value} must be positive and finite")
 
@@ -32,8 +33,7 @@ def within(stage: Any, low: float, high: float, *names: str) -> None:
     """
     for name in names:
         value = getattr(stage, name)
-        items = value if isinstance(value, (tuple, list)) else (value,)
-        if not all(low <= item <= high for item in items):
+        if not all(low <= item <= high for item in _items(value)):
             raise ValueError(f"{name}={value} must lie in {low:g} to {high:g}")
 
 
@@ -49,3 +49,7 @@ def at_least(stage: Any, low: int, *names: str) -> None:
         value = getattr(stage, name)
         if not value >= low:
             raise ValueError(f"{name}={value} must be at least {low}")
+
+
+def _items(value: Any) -> Sequence[Any]:
+    return value if isinstance(value, (tuple, list)) else (value,)

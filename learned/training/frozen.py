@@ -16,7 +16,7 @@ from hybridreg.learned.training.recipe import Phase
 
 
 class FrozenFeatures:
-    """The backbone's output by pair, in half precision: about 1 MB for 5,000 points, a twelfth of a step's work.
+    """The backbone's output by pair, in half precision: about 1 MB for 5,000 points.
 
     ``active`` is `lasting` of the phase; where it is false nothing is kept and nothing known.
     """
