@@ -207,10 +207,4 @@ def _assumed(points: Array, sign: float) -> Ground:
 
 
 def _level_frame(g: Ground) -> Array:
-    # The shortest turn that brings `up` to z, then the ground to z = 0.
-    z = np.array([0.0, 0.0, 1.0])
-    axis = np.cross(g.up, z)
-    sine, cosine = float(np.linalg.norm(axis)), float(g.up @ z)
-    direction = axis / sine if sine > 1e-9 else np.array([1.0, 0.0, 0.0])
-    R = se3.rotation_about(np.arctan2(sine, cosine) * direction)
-    return se3.from_rt(R, np.array([0.0, 0.0, -g.height]))
+    return se3.from_rt(g.levelling, np.array([0.0, 0.0, -g.height]))

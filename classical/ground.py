@@ -8,6 +8,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from hybridreg import se3
 from hybridreg.resolution import reach
 from hybridreg.scene import Level, Scene
 
@@ -34,6 +35,15 @@ class Ground(NamedTuple):
     def above(self, points: Array) -> Array:
         """Heights (n,) of points (n, 3) over the ground, metres."""
         return points @ self.up - self.height
+
+    @property
+    def levelling(self) -> Array:
+        """(3, 3): the shortest turn that brings `up` to z."""
+        z = np.array([0.0, 0.0, 1.0])
+        axis = np.cross(self.up, z)
+        sine, cosine = float(np.linalg.norm(axis)), float(self.up @ z)
+        direction = axis / sine if sine > 1e-9 else np.array([1.0, 0.0, 0.0])
+        return se3.rotation_about(np.arctan2(sine, cosine) * direction)
 
 
 def find(scene: Scene, side: Literal["source", "target"]) -> Ground | None:

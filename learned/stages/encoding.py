@@ -10,6 +10,7 @@ import torch
 from hybridreg.learned.batch import Batch, make_batch
 from hybridreg.learned.memory import require_memory
 from hybridreg.learned.network import Encoding
+from hybridreg.learned.stages.levelling import Turns, likeness
 from hybridreg.learned.stages.network_stage import NetworkStage
 from hybridreg.scene import Scene
 
@@ -29,13 +30,25 @@ def _encode(scene: Scene, stage: NetworkStage) -> Encoding:
     if network.image_encoder is not None and not (stage.sees() and scene.pair.image is not None):
         why = "no image" if scene.pair.image is None else "the network was trained without images"
         scene.note(f"{why}: features come from the clouds alone, a learned token in the image's place")
+    # Cylindrical kernel points take z for the vertical. Sensors may hang in any way: the ground tells, unless a wall was
+    # taken for it, so both are tried.
+    upright = Turns.upright(scene) if network.config.backbone.kernel == "cylindrical" else None
     with torch.inference_mode():
-        batch = _batch(scene, stage)
-        require_memory(batch.pyramid, network.config)
-        return network.encode(batch)
+        as_given = _encode_turned(scene, stage, Turns.none())
+        if upright is None:
+            return as_given
+        levelled = _encode_turned(scene, stage, upright)
+        return max(as_given, levelled, key=likeness)
 
 
-def _batch(scene: Scene, stage: NetworkStage) -> Batch:
+def _encode_turned(scene: Scene, stage: NetworkStage, turns: Turns) -> Encoding:
+    batch = _batch(scene, stage, turns)
+    network = stage.network()
+    require_memory(batch.pyramid, network.config)
+    return turns.back(network.encode(batch))
+
+
+def _batch(scene: Scene, stage: NetworkStage, turns: Turns) -> Batch:
     # A network's filters have the size of the voxel that it was trained with. Levels of that voxel are taken as
     # they are; others would show it a density that it never saw, so it makes its own from the clouds.
     config = stage.network().config
@@ -45,8 +58,8 @@ def _batch(scene: Scene, stage: NetworkStage) -> Batch:
         scene.note(_mismatch(scene.spacing, voxel))
     source, target = (scene.source, scene.target) if ready else (scene.pair.source, scene.pair.target)
     return make_batch(
-        target.points,
-        source.points,
+        target.points @ turns.target.T,
+        source.points @ turns.source.T,
         config,
         image=scene.pair.image if stage.sees() else None,
         subsample=not ready,
