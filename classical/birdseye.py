@@ -19,7 +19,7 @@ from hybridreg.classical.ground import Ground
 from hybridreg.classical.sweep import Planar, sweep
 from hybridreg.classical.voxel import VoxelGrid
 from hybridreg.matches import Correspondences, Pose
-from hybridreg.scene import Scene
+from hybridreg.scene import Level, Scene
 from hybridreg.stage import Stage
 from hybridreg.verdict.confidence import NEARLY
 from hybridreg.verdict.rivals import Rival, best_first, distinct
@@ -29,8 +29,8 @@ Side = Literal["source", "target"]
 
 # Outdoors; in a room, so many voxels along the distance within which all but a hundredth of the points lie.
 _VOXEL, _ALONG_REACH = 0.5, 60.0
-# In voxels: the coarse map's cell, how far from the sensor points are used.
-_COARSE, _REACH = 3.0, 200.0
+# In voxels: the coarse map's cell, how far from the sensor points are used. Two such clouds fit in the largest map.
+_COARSE, _REACH = 3.0, 175.0
 # Degrees between yaws; the share of the best peak's score that a peak needs: along a corridor the walls outvote what
 # tells one place from another.
 _YAW_STEP_DEG, _SHARE = 4.0, 0.65
@@ -106,7 +106,7 @@ class BirdsEye(Stage):
         if not found or found[0].support >= NEARLY:
             return found
         # Levelled by the best pose, both clouds lie truer than by their grounds.
-        T_level_source = _over_the_origin(T_level_target @ found[0].T)
+        T_level_source = _centred(T_level_target @ found[0].T, _centre(own.source))
         again = self._slid(self._view(own, "source", T_level_source, voxel), target, voxel)
         return found + best_first(scene, [T_target_level @ M @ T_level_source for M in again])
 
@@ -114,8 +114,7 @@ class BirdsEye(Stage):
         level = getattr(own, side)
         points = se3.apply(T_level_cloud, level.points)
         eye = None if level.viewpoint is None else se3.apply(T_level_cloud, level.viewpoint[None])[0]
-        centre = np.median(points, axis=0) if eye is None else eye
-        near = np.hypot(*(points - centre)[:, :2].T) < _REACH * voxel
+        near = np.hypot(*points[:, :2].T) < _REACH * voxel
         return from_above(points[near], eye, tuple(voxel * edge for edge in self.layers), voxel)
 
     def _planar(self, source: FromAbove, target: FromAbove, voxel: float) -> list[Array]:
@@ -159,8 +158,14 @@ class BirdsEye(Stage):
 _SIDES: tuple[Side, Side] = ("source", "target")
 
 
-def _over_the_origin(T_level_cloud: Array) -> Array:
-    return se3.from_rt(T_level_cloud[:3, :3], T_level_cloud[:3, 3] * [0.0, 0.0, 1.0])
+def _centre(level: Level) -> Array:
+    return np.median(level.points, axis=0) if level.viewpoint is None else level.viewpoint
+
+
+def _centred(T_level_cloud: Array, centre: Array) -> Array:
+    # The same turn and heights, with a place (3,) of the cloud on the axis that the maps turn about.
+    R, t = T_level_cloud[:3, :3], T_level_cloud[:3, 3]
+    return se3.from_rt(R, t - (R @ centre + t) * [1.0, 1.0, 0.0])
 
 
 def _matrices(found: Planar) -> list[Array]:
@@ -188,7 +193,8 @@ def _frames(own: Scene, scene: Scene) -> list[list[Array]]:
     for side, other in zip(_SIDES, reversed(_SIDES), strict=True):
         shown, known = found[side], found[other]
         head_down = known is not None and known.up[2] < -np.cos(np.radians(_STEEP_DEG))
-        assumed = _level_frame(_assumed(getattr(own, side).points, -1.0 if head_down else 1.0))
+        level = getattr(own, side)
+        assumed = _level_frame(_assumed(level.points, -1.0 if head_down else 1.0), level)
         if shown is None:
             scene.note(
                 f"bird's-eye search: no ground found in the {side}; its sensor is taken to "
@@ -197,7 +203,7 @@ def _frames(own: Scene, scene: Scene) -> list[list[Array]]:
             frames.append([assumed])
         else:
             steep = abs(shown.up[2]) < np.cos(np.radians(_STEEP_DEG))
-            frames.append([_level_frame(shown), assumed] if steep else [_level_frame(shown)])
+            frames.append([_level_frame(shown, level), assumed] if steep else [_level_frame(shown, level)])
     return frames
 
 
@@ -206,5 +212,5 @@ def _assumed(points: Array, sign: float) -> Ground:
     return Ground(up, float(np.quantile(points @ up, 0.02)))
 
 
-def _level_frame(g: Ground) -> Array:
-    return se3.from_rt(g.levelling, np.array([0.0, 0.0, -g.height]))
+def _level_frame(g: Ground, level: Level) -> Array:
+    return _centred(se3.from_rt(g.levelling, np.array([0.0, 0.0, -g.height])), _centre(level))

@@ -18,7 +18,7 @@ Complexes = NDArray[np.complex64]
 
 # Yaws transformed at once, and the sectors in which a place keeps a best yaw of its own (a street turned round).
 _BATCH, _SECTORS = 4, 4
-# Cells along a map; time and memory go with their square. Clouds with their sensor at the origin need about 200.
+# Cells along a map; time and memory go with their square.
 _LONGEST = 512
 # Parts of a spectrum quieter than this share of its mean are noise, and not made louder.
 _QUIET = 0.01

@@ -107,6 +107,7 @@ class OmpConfig:
     position: Literal["none", "sine"] = "none"
     pool: int = 4
     cross_cloud: bool = False
+    evidence: bool = False  # superpoints also know how alike and unique their points' partners are; ours
     min_kept: int = 32
     min_kept_share: float = 0.15
 

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import torch
 from torch import Tensor, nn
@@ -24,6 +24,7 @@ from hybridreg.learned.point_matching import PointMatches, gather_matches
 from hybridreg.learned.point_similarity import PointSimilarity, Voters, compare_points
 from hybridreg.learned.pyramid import Pyramid
 from hybridreg.learned.sinkhorn import OptimalTransport
+from hybridreg.learned.superpoint_evidence import superpoint_evidence
 from hybridreg.learned.superpoint_mask import Kept, choose
 from hybridreg.learned.superpoint_matching import SuperpointMatches, match_superpoints
 from hybridreg.learned.vgam import VisualGeometricAttention
@@ -47,6 +48,15 @@ class Encoding:
     target: CloudEncoding
     source: CloudEncoding
     image: ImageFeatures | None
+    evidence: tuple[Tensor, Tensor] | None = None  # of target and source, where OMP wants it
+
+
+class Known(NamedTuple):
+    """What no turn about the vertical and no shift changes: output of the backbone, and evidence for the overlap."""
+
+    coarse: Tensor  # (n, C), both clouds
+    fine: Tensor  # (N, d)
+    evidence: tuple[Tensor, Tensor] | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -105,17 +115,26 @@ class RegistrationNetwork(nn.Module):
             matches=matches,
         )
 
-    def encode(self, batch: Batch, features: tuple[Tensor, Tensor] | None = None) -> Encoding:
-        """Run the encoders and group fine points into patches; ``features`` spares the backbone where its output
-        for this batch is known."""
+    def encode(self, batch: Batch, known: Known | None = None) -> Encoding:
+        """Run the encoders and group fine points into patches; ``known`` spares the backbone where its output for this
+        batch is known."""
         pyramid = batch.pyramid
-        coarse, fine = self.backbone(batch.features, pyramid) if features is None else features
+        coarse, fine, evidence = known or Known(*self.backbone(batch.features, pyramid))
         nodes = coarse.split(list(pyramid.lengths[-1]))
         points = fine.split(list(pyramid.lengths[self.config.backbone.fine_stage - 1]))
-        return Encoding(
-            target=self._cloud(pyramid, 0, nodes[0], points[0]),
-            source=self._cloud(pyramid, 1, nodes[1], points[1]),
-            image=None if self.image_encoder is None else self.image_encoder(batch.image),
+        target = self._cloud(pyramid, 0, nodes[0], points[0])
+        source = self._cloud(pyramid, 1, nodes[1], points[1])
+        if evidence is None and self.omp is not None and self.omp.config.evidence:
+            evidence = self._evidence(target, source)
+        image = None if self.image_encoder is None else self.image_encoder(batch.image)
+        return Encoding(target=target, source=source, image=image, evidence=evidence)
+
+    def _evidence(self, target: CloudEncoding, source: CloudEncoding) -> tuple[Tensor, Tensor]:
+        return superpoint_evidence(
+            (len(target.nodes), len(source.nodes)),
+            (target.point_features, source.point_features),
+            (target.patches.owner, source.patches.owner),
+            self.config.matching.vote_temperature or 1.0,
         )
 
     def _cloud(
@@ -135,7 +154,11 @@ class RegistrationNetwork(nn.Module):
         """Overlap logits of all superpoints; None without OMP."""
         if self.omp is None or encoding.image is None:
             return None
-        return self.omp(encoding.target.node_features, encoding.source.node_features, encoding.image)
+        features = (encoding.target.node_features, encoding.source.node_features)
+        if encoding.evidence is not None:
+            target, source = (torch.cat(both, 1) for both in zip(features, encoding.evidence, strict=True))
+            features = (target, source)
+        return self.omp(*features, encoding.image)
 
     def keep(self, encoding: Encoding, overlap: OverlapLogits | None) -> tuple[Kept, Kept]:
         """Choose the superpoints of both clouds that go on. An uninformed mask keeps everything."""

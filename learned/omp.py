@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor, nn
 
+from hybridreg.learned import superpoint_evidence
 from hybridreg.learned.attention import Attention, AttentionLayer
 from hybridreg.learned.config import OmpConfig
 from hybridreg.learned.image_encoder import ImageFeatures, pool_tokens
@@ -35,7 +36,7 @@ class OverlapPredictor(nn.Module):
         super().__init__()
         self.config = config
         dim = config.dim
-        self.point = nn.Linear(point_dim, dim)
+        self.point = nn.Linear(point_dim + (superpoint_evidence.SIZE if config.evidence else 0), dim)
         self.point_norm = nn.LayerNorm(dim)
         self.cross = AttentionLayer(dim, config.heads) if config.cross_cloud else None
         self.token = nn.Conv2d(image_dim, dim, 3, padding=1)
@@ -50,7 +51,7 @@ class OverlapPredictor(nn.Module):
         self.logit = nn.Linear(dim, 1)
 
     def forward(self, target: Tensor, source: Tensor, image: ImageFeatures) -> OverlapLogits:
-        """Superpoint features (m, C), (n, C) to logits (m,), (n,)."""
+        """Superpoint features (m, C), (n, C), with `evidence` followed by it, to logits (m,), (n,)."""
         target, source = self.point_norm(self.point(target)), self.point_norm(self.point(source))
         if self.cross is not None:
             target, source = self.cross(target, source), self.cross(source, target)

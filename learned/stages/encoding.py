@@ -30,8 +30,8 @@ def _encode(scene: Scene, stage: NetworkStage) -> Encoding:
     if network.image_encoder is not None and not (stage.sees() and scene.pair.image is not None):
         why = "no image" if scene.pair.image is None else "the network was trained without images"
         scene.note(f"{why}: features come from the clouds alone, a learned token in the image's place")
-    # Cylindrical kernel points take z for the vertical. Sensors may hang in any way: the ground tells, unless a wall was
-    # taken for it, so both are tried.
+    # Cylindrical kernel points take z for the vertical, and sensors may hang in any way. The ground tells which,
+    # unless a wall was taken for it: both are tried.
     upright = Turns.upright(scene) if network.config.backbone.kernel == "cylindrical" else None
     with torch.inference_mode():
         as_given = _encode_turned(scene, stage, Turns.none())

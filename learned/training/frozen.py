@@ -3,14 +3,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable
+from collections.abc import Callable, Hashable
 
 import torch
 from torch import Tensor
 
 from hybridreg.learned.batch import Batch
 from hybridreg.learned.config import BackboneConfig
-from hybridreg.learned.network import RegistrationNetwork
+from hybridreg.learned.network import Known, RegistrationNetwork
 from hybridreg.learned.training.augmentation import Augmentation
 from hybridreg.learned.training.recipe import Phase
 
@@ -23,20 +23,25 @@ class FrozenFeatures:
 
     def __init__(self, network: RegistrationNetwork, active: bool) -> None:
         self._network, self._active = network, active
-        self._known: dict[Hashable, tuple[Tensor, Tensor]] = {}
+        self._known: dict[Hashable, Known] = {}
 
-    def of(self, pair: Hashable, batch: Batch) -> tuple[Tensor, Tensor] | None:
-        """Superpoint and fine features, (n, C) and (N, d) float32 without a graph; None where they must be computed
-        anew each time."""
+    def of(self, pair: Hashable, batch: Batch) -> Known | None:
+        """Features and evidence, float32 without a graph; None where they must be computed anew each time."""
         if not self._active:
             return None
         if pair not in self._known:
             with torch.no_grad():
-                coarse, fine = self._network.backbone(batch.features, batch.pyramid)
-            self._known[pair] = (coarse.cpu().half(), fine.cpu().half())
-        coarse, fine = self._known[pair]
+                known = Known(*self._network.backbone(batch.features, batch.pyramid))
+                evidence = self._network.encode(batch, known).evidence
+            self._known[pair] = _moved(known._replace(evidence=evidence), lambda one: one.cpu().half())
         device = batch.features.device
-        return coarse.to(device).float(), fine.to(device).float()
+        return _moved(self._known[pair], lambda one: one.to(device).float())
+
+
+def _moved(known: Known, move: Callable[[Tensor], Tensor]) -> Known:
+    target, source = known.evidence or (None, None)
+    evidence = None if target is None or source is None else (move(target), move(source))
+    return Known(move(known.coarse), move(known.fine), evidence)
 
 
 def lasting(phase: Phase, augmentation: Augmentation, backbone: BackboneConfig) -> bool:

@@ -11,7 +11,7 @@ from torch import Tensor
 from hybridreg.learned.circle_loss import circle_loss
 from hybridreg.learned.infonce_loss import InfoNceConfig, infonce
 from hybridreg.learned.losses import mask_loss, overlap_matrix
-from hybridreg.learned.network import Encoding, RegistrationNetwork
+from hybridreg.learned.network import Encoding, Known, RegistrationNetwork
 from hybridreg.learned.superpoint_mask import Kept
 from hybridreg.learned.training.recipe import LossWeights
 from hybridreg.learned.training.samples import Sample
@@ -45,18 +45,18 @@ def objective(
     contrast: InfoNceConfig,
     jitter: MaskJitter,
     generator: torch.Generator,
-    features: tuple[Tensor, Tensor] | None = None,
+    known: Known | None = None,
 ) -> Outcome:
     """Losses of a sample, ready for ``backward``. The network must be in training mode.
 
-    ``features`` is the output of a frozen backbone for this sample, where it is known.
+    ``known`` is the output of a frozen backbone for this sample.
     """
     hits: Tensor | None = None
     if not weights.matcher:
         points, features = fine_features(network, sample)
         loss, hits = contrastive_loss(network, sample, points, features, contrast, generator)
         return Outcome(total=weights.infonce * loss, parts={"infonce": loss}, hits=hits)
-    encoding = network.encode(sample.batch, features)
+    encoding = network.encode(sample.batch, known)
     parts: dict[str, Tensor] = {}
     if weights.infonce:
         points = (encoding.target.points, encoding.source.points)

@@ -50,6 +50,31 @@ def test_a_sensor_on_its_head(on_its_head: str) -> None:
     assert metres < 0.4
 
 
+def test_a_clouds_place_in_its_frame_does_not_matter() -> None:
+    # So far from the origin that this is not where the sensor stood: the clouds' middles take its place.
+    pair, truth = two_views(pose(8.0, -5.0, 70.0, 0.0), pose(0.0, 0.0, 0.0, 0.0))
+    source, target = np.array([900.0, 400.0, 0.0]), np.array([-300.0, 700.0, 2.0])
+    found, scene = run(hr.Pair.of(pair.source.points + source, pair.target.points + target))
+    back = se3.from_rt(np.eye(3), -target) @ found.T @ se3.from_rt(np.eye(3), source)
+    degrees, metres = wrong_by(back, truth)
+    assert scene.source.viewpoint is None
+    assert degrees < 1.5
+    assert metres < 0.4
+
+
+def test_clouds_that_reach_far_and_fit_badly_still_get_a_second_look() -> None:
+    # Two fields 400 m across with a few posts: no pose convinces, and the fine map is at its largest.
+    rng = np.random.default_rng(1)
+    fields = []
+    for _ in range(2):
+        flat = np.column_stack([rng.uniform(-200, 200, (20_000, 2)), rng.normal(-1.8, 0.01, 20_000)])
+        feet = np.repeat(rng.uniform(-120, 120, (60, 2)), 12, axis=0)
+        posts = np.column_stack([feet, np.tile(np.linspace(-1.8, 2.0, 12), 60)])
+        fields.append(np.concatenate([flat, posts]))
+    found, _ = run(hr.Pair.of(*fields))
+    assert found.found
+
+
 def test_the_best_pose_and_its_rivals_are_told_apart() -> None:
     pair, _ = two_views(pose(10.0, 0.0, 30.0, 0.0), pose(0.0, 0.0, 0.0, 0.0))
     found, _ = run(pair, tries=6)
