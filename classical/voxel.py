@@ -18,6 +18,9 @@ from hybridreg.stage import Stage
 Array = NDArray[np.float64]
 
 _MOST_CELLS = 2**62
+# Where the shorter of two reaches gives so small a voxel that the other cloud keeps more points, no method gains by them,
+# and all take longer.
+_MOST_POINTS = 30_000
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -28,7 +31,8 @@ class VoxelGrid(Stage):
     ----------
     voxel : float or None
         Edge of a cell, metres. None derives one length for both clouds from how far they reach
-        (`hybridreg.resolution.default_voxel`) and notes it in the result.
+        (`hybridreg.resolution.default_voxel`), a longer one where a cloud would keep more than 30,000 points of its
+        own otherwise, and notes it in the result.
     density : "keep" or "match"
         "match" gives each cloud the voxel at which both have about as many points per occupied volume; for a
         sparse sensor against a dense one.
@@ -44,9 +48,13 @@ class VoxelGrid(Stage):
             raise ValueError(f"density={self.density!r} must be 'keep' or 'match'")
 
     def __call__(self, pair: Pair) -> Scene:
-        voxel = self.voxel or default_voxel(pair.source.points, pair.target.points)
         clouds = (pair.source, pair.target)
+        voxel = self.voxel or default_voxel(pair.source.points, pair.target.points)
         points = [voxel_centroids(cloud.points, voxel) for cloud in clouds]
+        reached = voxel
+        while self.voxel is None and (most := max(map(len, points))) > _MOST_POINTS:
+            voxel = _two_digits_up(voxel * (most / _MOST_POINTS) ** 0.5)
+            points = [voxel_centroids(cloud.points, voxel) for cloud in clouds]
         spacing = [voxel, voxel]
         if self.density == "match":
             dense = int(np.argmax([len(p) for p in points]))
@@ -57,8 +65,16 @@ class VoxelGrid(Stage):
         )
         scene = Scene(pair=pair, source=source, target=target)
         if self.voxel is None:
-            scene.note(f"voxel {voxel:.3g} m, derived from the clouds' reach")
+            scene.note(
+                f"voxel {voxel:.3g} m, derived from the clouds' reach"
+                + (f" ({reached:.3g} m) and the number of points" if voxel > reached else "")
+            )
         return scene
+
+
+def _two_digits_up(length: float) -> float:
+    unit = 10.0 ** (math.floor(math.log10(length)) - 1)
+    return float(f"{math.ceil(length / unit) * unit:.2g}")
 
 
 def voxel_centroids(points: Array, voxel: float) -> Array:

@@ -94,6 +94,21 @@ def test_derived_voxel_follows_the_scale_and_is_noted() -> None:
     assert default_voxel(points * 1000, points * 1000) == pytest.approx(1000 * default_voxel(points, points))
 
 
+def test_derived_voxel_leaves_no_cloud_too_many_points() -> None:
+    # One sensor sees a corner of what the other sees: a sixtieth of its reach would cut that into very many cells.
+    rng = np.random.default_rng(0)
+    near, wide = rng.uniform(-3, 3, (2000, 3)), rng.uniform(-30, 30, (80_000, 3))
+    scene = VoxelGrid()(Pair.of(near, wide))
+    reached = default_voxel(near, wide)
+    assert len(scene.target) <= 30_000
+    assert len(scene.target) > 20_000
+    assert scene.source.spacing == scene.target.spacing > reached
+    assert scene.notes == [
+        f"voxel {scene.spacing:.3g} m, derived from the clouds' reach ({reached:.3g} m) and the number of points"
+    ]
+    assert len(VoxelGrid(voxel=reached)(Pair.of(near, wide)).target) > 70_000
+
+
 def test_derived_voxel_of_a_cloud_that_is_nearly_one_place() -> None:
     points = np.zeros((100, 3))
     points[:3] = np.eye(3)
