@@ -52,7 +52,7 @@ class BirdsEye(Stage):
 
     Where a cloud shows no ground, its sensor is taken to stand upright (or on its head, if the other one does) and
     its lowest points to be the ground; a note says so. Where the ground that it shows is so steep that it may be a
-    wall, both are tried.
+    wall, the vertical that the sensor's frame has is tried too, unless the ground's pose is plain.
 
     Parameters
     ----------
@@ -84,11 +84,12 @@ class BirdsEye(Stage):
     def __call__(self, scene: Scene, matches: Correspondences, rng: np.random.Generator) -> Pose:
         voxel = self.voxel or _default_voxel(scene)
         own = VoxelGrid(voxel=voxel)(scene.pair)
-        found = [
-            rival
-            for frames in product(*_frames(own, scene))
-            for rival in self._laid(scene, own, frames, voxel)
-        ]
+        found: list[Rival] = []
+        for frames in product(*_frames(own, scene)):
+            laid = self._laid(scene, own, frames, voxel)
+            found += laid
+            if laid and laid[0].support >= NEARLY:
+                break
         if not found:
             scene.note("bird's-eye search: nothing stands on the ground")
             return Pose.unknown()
