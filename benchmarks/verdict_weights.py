@@ -35,7 +35,7 @@ from hybridreg.scene import Scene
 from hybridreg.verdict import weigh
 from hybridreg.verdict.confidence import NO_RIVAL, OK, confidence
 from hybridreg.verdict.rivals import Rival
-from hybridreg.verdict.support import model, terms
+from hybridreg.verdict.support import terms
 
 Array = NDArray[np.float64]
 Row = dict[str, Any]
@@ -46,7 +46,6 @@ FIRST = 2000
 AS_IF = 0.15
 # Penalty on the squared weights of the standardised terms, per answer.
 RIDGE = 1e-3
-NAMES = tuple(model().weights)
 
 
 def pairs(tier: str, indices: range) -> Iterator[tuple[str, Pair, Array | None, float]]:
@@ -143,22 +142,22 @@ def fit(rows: list[Row]) -> tuple[dict[str, float], float]:
 
     v = minimize(loss, np.zeros(own.shape[1] + 1), method="L-BFGS-B").x
     weights = v[:-1] / width
-    return dict(zip(NAMES, weights.tolist(), strict=True)), float(v[-1] - middle @ weights)
+    return dict(zip(terms(rows[0]["evidence"]), weights.tolist(), strict=True)), float(
+        v[-1] - middle @ weights
+    )
 
 
 def _arrays(rows: list[Row]) -> tuple[Array, Array, NDArray[np.bool_], Array]:
-    own = np.array([[terms(row["evidence"])[name] for name in NAMES] for row in rows])
-    lacking = dict.fromkeys(NAMES, np.nan)
-    rival = np.array(
-        [[(terms(row["rival"][0]) if row["rival"] else lacking)[name] for name in NAMES] for row in rows]
-    )
+    own = np.array([list(terms(row["evidence"]).values()) for row in rows])
+    lacking = [np.nan] * own.shape[1]
+    rival = np.array([list(terms(row["rival"][0]).values()) if row["rival"] else lacking for row in rows])
     return own, rival, np.array([row["right"] for row in rows]), np.array([row["weight"] for row in rows])
 
 
 def predicted(rows: list[Row], weights: dict[str, float], intercept: float) -> Array:
     """Probability of each row under a rule."""
     own, rival, _, _ = _arrays(rows)
-    v = np.array([weights[name] for name in NAMES])
+    v = np.array([weights[name] for name in terms(rows[0]["evidence"])])
     s = own @ v + intercept
     margin = np.where(np.isnan(rival[:, 0]), NO_RIVAL, np.nan_to_num(rival) @ v + intercept - s)
     return np.array([confidence({"support": a, "rival_margin": b}) for a, b in zip(s, margin, strict=True)])

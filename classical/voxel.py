@@ -18,8 +18,8 @@ from hybridreg.stage import Stage
 Array = NDArray[np.float64]
 
 _MOST_CELLS = 2**62
-# Where the shorter of two reaches gives so small a voxel that the other cloud keeps more points, no method gains by them,
-# and all take longer.
+# Where the shorter of two reaches gives so small a voxel that the other cloud keeps more points, no method gains by
+# them, and all take longer.
 _MOST_POINTS = 30_000
 
 

@@ -160,8 +160,7 @@ def evidence_of(
     for name, way in (("source", agreement.source), ("target", agreement.target)):
         evidence[f"visible_{name}"] = float(np.mean(way.looked))
         evidence[f"hidden_{name}"] = float(np.mean(way.hidden))
-        evidence[f"looked_through_{name}"] = _share(way.free, way.looked)
-        evidence[f"fitness_visible_{name}"] = _share(way.covered & way.looked, way.looked)
+        evidence[f"fitness_visible_{name}"] = support.share(way.covered & way.looked, way.looked)
     return evidence
 
 
@@ -174,11 +173,6 @@ def _surfaces(way: OneWay, target: View) -> dict[str, float]:
         "normals": float(cosine.mean()) if near.any() else 0.0,
         "inlier_rmse": float(np.sqrt(np.mean(across**2))) if agrees.any() else 0.0,
     }
-
-
-def _share(part: NDArray[np.bool_], whole: NDArray[np.bool_]) -> float:
-    n = int(np.count_nonzero(whole))
-    return float(np.count_nonzero(part)) / n if n else 0.0
 
 
 def _agreeing(matches: Correspondences, T: Array, distance: float) -> float:

@@ -18,9 +18,12 @@ from hybridreg.verdict.information import Information
 from hybridreg.verdict.views import View
 
 Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
 
 # Below this no direction is held, and how little it is held says no more.
 _UNHELD = 1e-4
+# A share below this is as good as none.
+_NOTHING = 0.02
 
 
 class Model(NamedTuple):
@@ -45,11 +48,18 @@ def support(evidence: Mapping[str, float]) -> float:
 
 
 def terms(evidence: Mapping[str, float]) -> dict[str, float]:
-    """What the rule weighs: shares as they are, information and number of recipes by their logarithm."""
+    """What the rule weighs: shares as they are, what has no scale or begins at nothing by its logarithm.
+
+    No term tells source from target, so that a pair turned round has the same confidence.
+    """
+    through = [evidence[f"looked_through_{side}"] for side in ("source", "target")]
     return {
         "agreement_least": evidence["agreement_least"],
         "agreement_middle": evidence["agreement_middle"],
+        "agreement_most": evidence["agreement_most"],
+        "log_agreement_least": float(np.log(evidence["agreement_least"] + _NOTHING)),
         "looked_through": evidence["looked_through"],
+        "looked_through_less": min(through),
         "log_weakest": float(np.log10(evidence["weakest"] + _UNHELD)),
         "log_recipes": float(np.log(evidence["recipes"])),
     }
@@ -72,7 +82,15 @@ def numbers(agreement: Agreement, held: Information, recipes: int = 1) -> dict[s
         "weakest": held.weakest,
         "recipes": recipes,
     }
+    for side, way in (("source", agreement.source), ("target", agreement.target)):
+        found[f"looked_through_{side}"] = share(way.free, way.looked)
     return {name: float(value) for name, value in found.items()}
+
+
+def share(part: Mask, whole: Mask) -> float:
+    """Of the marked points of `whole` (n,), those that `part` (n,) marks; 0 of none."""
+    n = int(np.count_nonzero(whole))
+    return float(np.count_nonzero(part)) / n if n else 0.0
 
 
 def of(source: View, target: View, T_target_source: Array, spacing: float, every: int = 1) -> float:

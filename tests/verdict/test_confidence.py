@@ -10,15 +10,17 @@ from hybridreg.verdict.confidence import FAILED, NEARLY, NO_RIVAL, OK, confidenc
 from hybridreg.verdict.support import found_by, model, support, terms
 
 share = st.floats(0.0, 1.0)
-own = st.fixed_dictionaries(
-    {
-        "agreement_least": share,
-        "agreement_middle": share,
-        "looked_through": share,
-        "weakest": st.floats(0.0, 1.0 / 3.0),
-        "recipes": st.integers(1, 5),
-    }
-)
+EVIDENCE = {
+    "agreement_least": share,
+    "agreement_middle": share,
+    "agreement_most": share,
+    "looked_through": share,
+    "looked_through_source": share,
+    "looked_through_target": share,
+    "weakest": st.floats(0.0, 1.0 / 3.0),
+    "recipes": st.integers(1, 5),
+}
+own = st.fixed_dictionaries(EVIDENCE)
 log_odds = st.floats(-15.0, 15.0)
 
 
@@ -28,13 +30,13 @@ def believed(pose: float, rival: float) -> float:
 
 @given(
     own,
-    st.sampled_from(["agreement_least", "agreement_middle", "looked_through", "weakest", "recipes"]),
+    st.sampled_from(list(EVIDENCE)),
     share,
 )
 def test_more_agreement_and_fewer_objections_never_lower_the_support(
     numbers: dict[str, float], name: str, step: float
 ) -> None:
-    against = name == "looked_through"
+    against = name.startswith("looked_through")
     better = {**numbers, name: numbers[name] + (-step if against else 1 if name == "recipes" else step)}
     assert support(better) >= support(numbers)
 
@@ -43,7 +45,10 @@ def test_the_rule_weighs_the_terms_and_nothing_else() -> None:
     numbers = {
         "agreement_least": 0.5,
         "agreement_middle": 0.6,
+        "agreement_most": 0.9,
         "looked_through": 0.1,
+        "looked_through_source": 0.2,
+        "looked_through_target": 0.05,
         "weakest": 0.02,
         "recipes": 1,
     }
@@ -84,3 +89,13 @@ def test_without_a_rival_the_confidence_is_that_of_the_support(pose: float) -> N
 )
 def test_words(probability: float, expected: str) -> None:
     assert word(probability) == expected
+
+
+@given(own)
+def test_a_pair_turned_round_has_the_same_support(numbers: dict[str, float]) -> None:
+    round_about = {
+        **numbers,
+        "looked_through_source": numbers["looked_through_target"],
+        "looked_through_target": numbers["looked_through_source"],
+    }
+    assert support(round_about) == support(numbers)
