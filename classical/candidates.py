@@ -24,9 +24,9 @@ Entry = Mapping[str, Any]
 
 _SLOTS = ("overlap", "match", "estimate")
 # Poses looked at of each entry: its own and the best of its rivals; how many of these are refined at most.
-_LOOKED_AT, _REFINED = 8, 3
+_LOOKED_AT, _REFINED = 8, 2
 # Log-odds below which a settled pose is not refined, and by which its support may fall when it is.
-_HOPELESS, _NOISE = -5.0, 1.0
+_HOPELESS, _NOISE = -3.0, 1.0
 
 
 @dataclass(frozen=True, kw_only=True)
