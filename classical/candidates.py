@@ -45,7 +45,8 @@ class Candidates(Stage):
         without `match` gets the matches that this stage was given. One that raises ValueError, ImportError or OSError,
         or lacks its image, is left out with a note.
     refine : stage of the refine slot
-        For the best pose of an entry. The pose returned needs no other refinement.
+        For the best poses of an entry. The pose returned needs no other refinement, unless nothing speaks for it: no
+        refinement is tried then, as nothing would let it rest.
     enough : float in [0, 1]
         Confidence at which the search stops (the verdict's "ok"); 1 tries every entry.
     """
@@ -73,8 +74,6 @@ class Candidates(Stage):
                 break
         if not found:
             return Pose.unknown(len(matches))
-        if found[0].support <= _HOPELESS:
-            found[0] = self._refined(scene, found[0])
         return _best_of(found)
 
     def stages(
