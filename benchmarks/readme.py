@@ -4,14 +4,15 @@
     python -m benchmarks.readme real=runs/real/table.md peers=runs/peers.md
 
 replaces what stands in README.md between `<!-- real -->` and `<!-- /real -->` by that file, and so on; of a file that
-`hybridreg table` wrote, by its first protocol's caption, results and verdicts. `--page docs/simulator.md` names
-another page.
+`hybridreg table` wrote, by its first protocol's caption, results and verdicts, or the `--sections` whose titles begin
+as told. `--page docs/simulator.md` names another page.
 """
 
 from __future__ import annotations
 
 import argparse
 import re
+from collections.abc import Sequence
 from pathlib import Path
 
 from hybridreg.io import write_text
@@ -34,14 +35,17 @@ def insert(page: str, name: str, text: str) -> str:
     return pattern.sub(lambda found: f"{found[1]}\n{text.strip()}\n\n{found[2]}", page)
 
 
-def shown(text: str) -> str:
-    """Caption, results and verdicts of a table's first protocol; any other text as it is."""
+def shown(text: str, sections: Sequence[str] = _SHOWN) -> str:
+    """Caption and some sections of a table's first protocol, results and verdicts; any other text as it is."""
     protocols = re.split(r"^## .*$", text, flags=re.MULTILINE)
     if len(protocols) < 2:
         return text
-    caption, *sections = re.split(r"^### (.*)$", protocols[1], flags=re.MULTILINE)
-    bodies = dict(zip(sections[::2], sections[1::2], strict=True))
-    return "\n\n".join([caption.strip(), *(bodies[name].strip() for name in _SHOWN if name in bodies)])
+    caption, *parts = re.split(r"^### (.*)$", protocols[1], flags=re.MULTILINE)
+    bodies = dict(zip(parts[::2], parts[1::2], strict=True))
+    chosen = [
+        body.strip() for wanted in sections for title, body in bodies.items() if title.startswith(wanted)
+    ]
+    return "\n\n".join([caption.strip(), *chosen])
 
 
 def main() -> None:
@@ -50,12 +54,13 @@ def main() -> None:
     )
     parser.add_argument("parts", nargs="+", metavar="name=file")
     parser.add_argument("--page", default="README.md")
+    parser.add_argument("--sections", nargs="+", default=_SHOWN)
     given = parser.parse_args()
     file = ROOT / given.page
     page = file.read_text(encoding="utf-8")
     for part in given.parts:
         name, _, table = part.partition("=")
-        page = insert(page, name, shown(Path(table).read_text(encoding="utf-8")))
+        page = insert(page, name, shown(Path(table).read_text(encoding="utf-8"), given.sections))
     write_text(file, page)
 
 
