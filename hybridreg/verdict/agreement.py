@@ -118,7 +118,10 @@ def main_axes(*facing: Array) -> Array:
     weight = np.concatenate([np.full(len(n), 1.0 / len(n)) for n in facing])[:, None]
     axes = np.linalg.eigh((weight * normals).T @ normals)[1].T
     for _ in range(_TURNS):
-        U, _, Vt = np.linalg.svd((weight * (normals @ axes.T) ** 3).T @ normals)
+        along = normals @ axes.T
+        U, _, Vt = np.linalg.svd(
+            (weight * (along * along * along)).T @ normals
+        )  # ** 3 takes five times as long
         axes = U @ Vt
     share = np.bincount(np.argmax(np.abs(normals @ axes.T), axis=1), weights=weight[:, 0], minlength=3)
     return axes[np.argsort(-share)]
