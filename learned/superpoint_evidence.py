@@ -7,6 +7,8 @@ place looks like; whether the other cloud has such a place, they do not.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import torch
 from torch import Tensor
 from torch.nn import functional as F
@@ -36,16 +38,19 @@ def superpoint_evidence(
         Of the softmax over all points of the other cloud.
     """
     f, g = (F.normalize(one.detach(), dim=1) for one in features)
-    (best_f, total_f), (best_g, total_g) = _partners(f, g, temperature)
-    sides = ((sizes[0], owners[0], best_f, total_f), (sizes[1], owners[1], best_g, total_g))
-    target, source = (_gathered(*side, temperature) for side in sides)
-    return target, source
+    of_f, of_g = partners(f, g, temperature)
+    return _gathered(sizes[0], owners[0], of_f), _gathered(sizes[1], owners[1], of_g)
 
 
-def _partners(
-    f: Tensor, g: Tensor, temperature: float
-) -> tuple[tuple[Tensor, Tensor], tuple[Tensor, Tensor]]:
-    # Of each point of both clouds the likeness of the likest partner, and the logarithm of the softmax's denominator.
+class Partners(NamedTuple):
+    """Of each point of a cloud (n,): cosine with its likest partner, and the logarithm of that one's softmax."""
+
+    best: Tensor
+    sure: Tensor
+
+
+def partners(f: Tensor, g: Tensor, temperature: float) -> tuple[Partners, Partners]:
+    """The likest partners of unit features (M, d), (N, d) among each other, from every pair in one pass."""
     best_f, total_f = [], []
     best_g, total_g = g.new_full((len(g),), -1.0), g.new_zeros(len(g))
     for block in f.split(_BLOCK):
@@ -56,13 +61,17 @@ def _partners(
         scores.sub_(1.0).div_(temperature).exp_()
         total_f.append(scores.sum(1))
         total_g += scores.sum(0)
-    least, shift = torch.finfo(f.dtype).tiny, 1.0 / temperature
-    logs = (total.clamp_min(least).log() + shift for total in (torch.cat(total_f), total_g))
-    return (torch.cat(best_f), next(logs)), (best_g, next(logs))
+
+    def told(best: Tensor, total: Tensor) -> Partners:
+        return Partners(
+            best, (best - 1.0) / temperature - total.clamp_min(torch.finfo(total.dtype).tiny).log()
+        )
+
+    return told(torch.cat(best_f), torch.cat(total_f)), told(best_g, total_g)
 
 
-def _gathered(n: int, owner: Tensor, best: Tensor, total: Tensor, temperature: float) -> Tensor:
-    sure = best / temperature - total  # log of the softmax at the likest partner
+def _gathered(n: int, owner: Tensor, found: Partners) -> Tensor:
+    best, sure = found
     count = torch.bincount(owner, minlength=n).to(best.dtype)
     columns = []
     for value in (best, sure / 4.0):

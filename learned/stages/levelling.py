@@ -8,18 +8,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 import torch
 from numpy.typing import NDArray
-from torch import Tensor
 from torch.nn import functional as F
 
 from hybridreg.classical import ground
 from hybridreg.learned.network import CloudEncoding, Encoding
+from hybridreg.learned.superpoint_evidence import partners
 from hybridreg.scene import Scene
 
 Array = NDArray[np.float64]
 
 # A network has seen clouds tilted by 5 degrees in training, and takes a few more.
 _TILTED_DEG = 10.0
-_BLOCK = 1024
 
 
 @dataclass(frozen=True)
@@ -56,12 +55,10 @@ def likeness(encoding: Encoding) -> float:
 
     A ground may be a wall: of the clouds as they are and levelled, those are right whose features are more alike.
     """
-    features = [F.normalize(cloud.point_features, dim=1) for cloud in (encoding.target, encoding.source)]
-    return (_best(*features) + _best(*reversed(features))) / 2
-
-
-def _best(of: Tensor, among: Tensor) -> float:
-    return float(torch.cat([(block @ among.t()).amax(1) for block in of.split(_BLOCK)]).mean())
+    target, source = (
+        F.normalize(cloud.point_features, dim=1) for cloud in (encoding.target, encoding.source)
+    )
+    return sum(float(one.best.mean()) for one in partners(target, source, temperature=1.0)) / 2
 
 
 def _upright(found: ground.Ground | None) -> Array | None:
