@@ -17,6 +17,8 @@ import hybridreg as hr
 from benchmarks.hostile.containers import contain
 from benchmarks.hostile.stored import FILES, StoredCase
 from hybridreg import Pipeline, PointCloud, changes, se3, spec
+from hybridreg.classical import sweep as sweep_module
+from hybridreg.classical.columns import Columns, FromAbove
 from hybridreg.data.folder import load_pair
 from hybridreg.eval import recipe, table
 from hybridreg.eval.store import read
@@ -278,3 +280,24 @@ def test_an_archive_that_unpacks_to_what_no_cloud_is(tmp_path: Path) -> None:
             member.write(bytes(2**24))
     with pytest.raises(ValueError, match="would unpack from .* as no cloud does"):
         read_points(tmp_path / "bomb.npz")
+
+
+def test_birdseye_maps_do_not_grow_with_the_distance_from_the_origin(monkeypatch: pytest.MonkeyPatch) -> None:
+    # A shift keeps the sensor's place out of reach, so both runs take the clouds' middles for it.
+    pair, _ = sample_pair(0, 300)
+    cells: list[int] = []
+    whole = sweep_module.signed
+    monkeypatch.setattr(
+        sweep_module, "signed", lambda view, turn, n, cell: cells.append(n) or whole(view, turn, n, cell)
+    )
+    pipeline = Pipeline(match="none", estimate="birdseye", refine="none")
+    for away in ([900.0, 400.0, 0.0], [9000.0, 4000.0, 0.0]):
+        pipeline(pair.source.points + away, pair.target.points + away)
+    assert 0 < max(cells) <= sweep_module._LONGEST
+
+
+def test_a_sweep_refuses_maps_that_would_not_fit() -> None:
+    far = Columns(np.array([9000.0 + 4000.0j]), np.array([0]))
+    view = FromAbove(far, far, 1)
+    with pytest.raises(ValueError, match="move each cloud's sensor"):
+        sweep_module.sweep(view, view, cell=1.0, yaws=np.zeros(1), farthest=10.0, most=1, share=0.5)
