@@ -58,7 +58,7 @@ def measure(data: str, name: str, n: int) -> dict[str, Any]:
     ]
     pair, gate, _ = timed(lambda: Pair.of(*clouds, id=name))
     Pipeline.preset("default").run(labelled.pair)  # imports are not what is measured
-    voxel = default_voxel(pair.source.points, pair.target.points)
+    voxel = default_voxel(pair.source, pair.target)
     _, grid, _ = timed(lambda: [voxel_centroids(c.points, voxel) for c in (pair.source, pair.target)])
     reset_peak_memory()
     before = peak_memory_mb() or np.nan

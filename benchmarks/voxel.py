@@ -50,7 +50,7 @@ def main() -> None:
     ratios: dict[str, list[float]] = {"open3d": [], "open3d, converted before": []}
     for labelled in real_pairs(options.data, options.pairs):
         pair = labelled.pair
-        voxel = default_voxel(pair.source.points, pair.target.points)
+        voxel = default_voxel(pair.source, pair.target)
         for name, cloud in (("source", pair.source), ("target", pair.target)):
             taken = compare(cloud.points, voxel)
             for peer, values in ratios.items():

@@ -18,6 +18,7 @@ from hybridreg.classical.columns import FromAbove, from_above
 from hybridreg.classical.ground import Ground
 from hybridreg.classical.sweep import Planar, sweep
 from hybridreg.classical.voxel import VoxelGrid
+from hybridreg.extent import share_within
 from hybridreg.matches import Correspondences, Pose
 from hybridreg.scene import Level, Scene
 from hybridreg.stage import Stage
@@ -179,11 +180,7 @@ def _matrices(found: Planar) -> list[Array]:
 
 
 def _default_voxel(scene: Scene) -> float:
-    clouds = (scene.pair.source.points, scene.pair.target.points)
-    reach = max(
-        float(np.quantile(np.linalg.norm(points - np.median(points, axis=0), axis=1), 0.99))
-        for points in clouds
-    )
+    reach = max(share_within(cloud.radii, 0.99) for cloud in (scene.pair.source, scene.pair.target))
     return min(_VOXEL, float(f"{reach / _ALONG_REACH:.2g}")) or _VOXEL
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybridreg.classical.terrain import Terrain
+from hybridreg.extent import bounds
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -65,8 +66,8 @@ def _columns(points: Array, heights: Array, edges: tuple[float, ...], width: flo
     if not inside.any():
         return Columns(np.zeros(0, dtype=np.complex128), np.zeros(0, dtype=np.int64))
     ij = np.floor(points[inside, :2] / width).astype(np.int64)
-    low = ij.min(axis=0)
-    nx, ny = ij.max(axis=0) - low + 1
+    low, high = bounds(ij)
+    nx, ny = high - low + 1
     held = np.zeros((len(edges) - 1, nx, ny), dtype=bool)
     held[layer[inside], ij[:, 0] - low[0], ij[:, 1] - low[1]] = True
     layer, i, j = np.nonzero(held)

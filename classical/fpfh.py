@@ -10,10 +10,10 @@ from typing import ClassVar, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from hybridreg import normals as surface
 from hybridreg._open3d import load_open3d
 from hybridreg.classical.nearest import nearest
 from hybridreg.matches import Correspondences, Overlap
-from hybridreg.normals import surface
 from hybridreg.scene import Level, Scene
 from hybridreg.stage import Stage
 
@@ -101,7 +101,7 @@ class Fpfh(Stage):
         """Descriptors (n, 33) of a level's points: roots of histograms, zero where there is no neighbour."""
         level: Level = getattr(scene, side)
         radius = self.radius or _RADIUS * scene.spacing
-        normals = surface(scene, side, self.normal_neighbours).normals
+        normals = surface.of(scene, side, self.normal_neighbours)
         key = ("fpfh", side, radius, self.max_neighbours, self.normal_neighbours)
         return scene.shared(key, lambda: _fpfh(level.points, normals, radius, self.max_neighbours))
 

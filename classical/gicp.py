@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import os
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
@@ -15,7 +14,7 @@ from hybridreg.classical.voxel import voxel_centroids
 from hybridreg.fitness import measure
 from hybridreg.matches import Pose
 from hybridreg.normals import tree
-from hybridreg.resources import n_threads
+from hybridreg.resources import n_workers
 from hybridreg.scene import Scene
 from hybridreg.stage import Stage
 
@@ -103,15 +102,11 @@ def _prepared(scene: Scene, side: Side, voxel: float, neighbours: int) -> tuple[
     )
 
 
-def _threads() -> int:
-    # Each point's covariance is its own sum, so here the number of threads changes nothing.
-    return n_threads() if n_threads() > 0 else os.cpu_count() or 1
-
-
 def _prepare(points: Array, voxel: float, neighbours: int) -> tuple[Any, Any]:
     import small_gicp
 
     cloud = small_gicp.PointCloud(voxel_centroids(points, voxel))
-    kd_tree = small_gicp.KdTree(cloud)
-    small_gicp.estimate_covariances(cloud, kd_tree, min(neighbours, cloud.size()), _threads())
+    kd_tree = small_gicp.KdTree(cloud, num_threads=n_workers())
+    # Each point's covariance is its own sum, so here the number of threads changes nothing.
+    small_gicp.estimate_covariances(cloud, kd_tree, min(neighbours, cloud.size()), n_workers())
     return cloud, kd_tree

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybridreg import se3
+from hybridreg.extent import radii
 from hybridreg.resolution import reach
 from hybridreg.scene import Level, Scene
 
@@ -63,7 +64,7 @@ def _find(level: Level) -> Ground | None:
     rng = np.random.default_rng(0)
     points = level.points[rng.permutation(len(level))[: 4 * _MANY]] - viewpoint
     weights = _nearer_more(points)
-    thick = max(_SPACINGS * level.spacing, min(_THICK, _OF_REACH * reach(points)))
+    thick = max(_SPACINGS * level.spacing, min(_THICK, _OF_REACH * reach(radii(points))))
     ups, heights = _planes(points, rng)
     for n, kept in ((_FEW, _LOOKED_AT), (_MANY, _FITTED)):
         scores = _scores(points[:n], weights[:n], ups, heights, thick)

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybridreg import limits, se3
+from hybridreg import normals as surface
 from hybridreg.matches import Pose
-from hybridreg.normals import surface, tree
 from hybridreg.resources import n_threads
 from hybridreg.scene import Scene
 from hybridreg.stage import Stage
@@ -60,7 +60,7 @@ class Icp(Stage):
 
     def _step(self, scene: Scene, T: Array, max_distance: float) -> Array | None:
         moved = se3.apply(T, scene.source.points)
-        distance, index = tree(scene, "target").query(
+        distance, index = surface.tree(scene, "target").query(
             moved, distance_upper_bound=max_distance, workers=n_threads()
         )
         hit = np.isfinite(distance)
@@ -68,7 +68,7 @@ class Icp(Stage):
             return None
         p, q = moved[hit], scene.target.points[index[hit]]
         if self.kind == "plane":
-            return plane_step(p, q, surface(scene, "target").normals[index[hit]])
+            return plane_step(p, q, surface.of(scene, "target")[index[hit]])
         return point_step(p, q)
 
 

@@ -8,6 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from hybridreg.extent import bounds
+
 Array = NDArray[np.float64]
 
 # Points within this of the plane, and this more for each metre of distance, may be ground: a slope of a few degrees.
@@ -41,8 +43,8 @@ class Terrain:
             return cls(np.zeros((1, 1)), np.zeros(2), cell)
         reach = np.hypot(points[:, 0], points[:, 1])
         low = points[np.abs(points[:, 2]) < _NEAR + _SLOPE * reach]
-        corner = points[:, :2].min(axis=0)
-        shape = np.floor((points[:, :2].max(axis=0) - corner) / cell).astype(np.int64) + 1
+        corner, end = bounds(points[:, :2])
+        shape = np.floor((end - corner) / cell).astype(np.int64) + 1
         i, j = ((low[:, :2] - corner) / cell).astype(np.int64).T
         lowest = np.full(shape, np.inf)
         np.minimum.at(lowest, (i, j), low[:, 2])

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybridreg.classical import ground
+from hybridreg.extent import radii
 from hybridreg.matches import Overlap
 from hybridreg.range_image import RangeImage
 from hybridreg.resolution import reach
@@ -56,7 +57,7 @@ class Visibility(Stage):
     def __call__(self, scene: Scene) -> Overlap:
         baseline = self.baseline
         if baseline is None:
-            baseline = 0.5 * min(reach(scene.source.points), reach(scene.target.points))
+            baseline = 0.5 * min(reach(radii(scene.source.points)), reach(radii(scene.target.points)))
         return Overlap(_reached(scene, "source", baseline), _reached(scene, "target", baseline))
 
 

@@ -49,7 +49,7 @@ class VoxelGrid(Stage):
 
     def __call__(self, pair: Pair) -> Scene:
         clouds = (pair.source, pair.target)
-        voxel = self.voxel or default_voxel(pair.source.points, pair.target.points)
+        voxel = self.voxel or default_voxel(pair.source, pair.target)
         points = [voxel_centroids(cloud.points, voxel) for cloud in clouds]
         reached = voxel
         while self.voxel is None and (most := max(map(len, points))) > _MOST_POINTS:

@@ -87,7 +87,7 @@ def _level_sizes(trace: Trace | None) -> dict[str, int]:
 def _overlap(labelled: LabelledPair) -> dict[str, Any]:
     # The radius comes from the clouds alone, so that every method is measured on the same points.
     pair = labelled.pair
-    radius = default_voxel(pair.source.points, pair.target.points)
+    radius = default_voxel(pair.source, pair.target)
     sample = pair.source.points[:: max(1, len(pair.source) // _SAMPLE)]
     moved = se3.apply(lower_pose(labelled.T_target_source, pair), sample)
     common = sample[near(moved, pair.target.points, radius)]

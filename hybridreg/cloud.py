@@ -10,7 +10,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from hybridreg import gate
+from hybridreg import extent, gate
 
 Array = NDArray[np.float64]
 
@@ -74,9 +74,19 @@ class PointCloud:
         return len(self.points)
 
     @cached_property
+    def bounds(self) -> tuple[Array, Array]:
+        """Lower and upper corner, each (3,), of the box around the points."""
+        return extent.bounds(self.points)
+
+    @cached_property
+    def radii(self) -> Array:
+        """Distances (N,) from the cloud's middle, the shortest first, metres."""
+        return extent.radii(self.points)
+
+    @cached_property
     def viewpoint(self) -> Array | None:
         """Where the sensor stood, (3,): the origin of its frame, or None where that lies far from the points."""
-        low, high = self.points.min(axis=0), self.points.max(axis=0)
+        low, high = self.bounds
         margin = 0.1 * float(np.linalg.norm(high - low))
         inside = bool(np.all(low - margin <= 0.0) and np.all(high + margin >= 0.0))
         return np.zeros(3) if inside else None

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from hybridreg import se3
+from hybridreg.extent import bounds
 from hybridreg.resources import n_threads
 
 Array = NDArray[np.float64]
@@ -69,8 +70,8 @@ def _nearest(tree: cKDTree, points: Array, max_distance: float) -> tuple[Array, 
 
 def _by_place(points: Array, cell: float) -> NDArray[np.int64]:
     """An order of points (n, 3) in which those of one cell of a grid follow each other."""
-    low = points.min(axis=0)
-    cell = max(cell, float(np.ptp(points, axis=0).max()) / _MOST_CELLS)
+    low, high = bounds(points)
+    cell = max(cell, float((high - low).max()) / _MOST_CELLS)
     x, y, z = np.minimum((points - low) / cell, _MOST_CELLS - 1).astype(np.int64).T
     order: NDArray[np.int64] = np.argsort((x * _MOST_CELLS + y) * _MOST_CELLS + z)
     return order

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hybridreg import gate, registry
+from hybridreg.extent import share_within
 from hybridreg.pair import Pair
 from hybridreg.scene import Scene
 from hybridreg.slots import SLOTS
@@ -100,7 +101,8 @@ def check_scene(scene: Scene) -> None:
                 f"{name}: {len(level)} of {len(cloud)} points are left after downsampling to {level.spacing:.3g} m, "
                 f"fewer than {gate.MIN_POINTS}; choose a smaller voxel"
             )
-        extent = np.ptp(cloud.points, axis=0)
+        low, high = cloud.bounds
+        extent = high - low
         axis = int(np.argmax(extent))
         cells = extent[axis] / level.spacing
         if cells > _MANY_CELLS:
@@ -114,7 +116,7 @@ def check_scene(scene: Scene) -> None:
                 f"{level.spacing:.3g} m; a smaller voxel or another unit may be meant"
             )
         # The inner half of the points, so that one stray return does not decide.
-        reach = float(np.median(np.linalg.norm(cloud.points - np.median(cloud.points, axis=0), axis=1)))
+        reach = share_within(cloud.radii, 0.5)
         if reach > _FARTHEST or reach < _SMALLEST:
             unit = "millimetres" if reach > _FARTHEST else "kilometres or a normalised unit"
             _warn(

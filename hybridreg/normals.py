@@ -3,51 +3,50 @@
 
 from __future__ import annotations
 
-from typing import Literal, NamedTuple
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from hybridreg.resources import n_threads
+from hybridreg.resources import n_workers
 from hybridreg.scene import Level, Scene
 
 Array = NDArray[np.float64]
+Side = Literal["source", "target"]
+
+# small_gicp gives no normal to a point with fewer neighbours.
+_FEWEST = 5
 
 
-class Surface(NamedTuple):
-    """Local shape at each point.
-
-    normals : (n, 3) float64, unit length, towards the sensor where its place is known, else upwards
-    planarity : (n,) float64 in [0, 1], (l2 - l3) / l1 of the neighbourhood's eigenvalues
-    """
-
-    normals: Array
-    planarity: Array
-
-
-def surface(scene: Scene, side: Literal["source", "target"], k: int = 20) -> Surface:
-    """Normals of one level from each point's k nearest neighbours, shared by the stages of the run."""
+def of(scene: Scene, side: Side, k: int = 20) -> Array:
+    """Normals (n, 3) of one level from each point's k nearest neighbours, shared by the stages of the run."""
     level: Level = getattr(scene, side)
-    return scene.shared(("surface", side, k), lambda: estimate(level.points, level.viewpoint, k))
+    return scene.shared(("normals", side, k), lambda: estimate(level.points, level.viewpoint, k))
 
 
-def tree(scene: Scene, side: Literal["source", "target"]) -> cKDTree:
+def tree(scene: Scene, side: Side) -> cKDTree:
     """KD-tree of one level, shared by the stages of the run."""
     level: Level = getattr(scene, side)
     return scene.shared(("tree", side), lambda: cKDTree(level.points))
 
 
-def estimate(points: Array, viewpoint: Array | None, k: int = 20) -> Surface:
-    """Normals (n, 3) of `points` (n, 3): the direction of least spread among the k nearest neighbours."""
+def estimate(points: Array, viewpoint: Array | None, k: int = 20) -> Array:
+    """Normals (n, 3) of `points` (n, 3): the direction of least spread among the k nearest neighbours.
+
+    Of unit length, towards the sensor at `viewpoint` (3,), or upwards where its place is not known. The wheel of
+    small_gicp computes them four times as fast as numpy does.
+    """
+    import small_gicp
+
     k = min(k, len(points))
-    _, index = cKDTree(points).query(points, k=k, workers=n_threads())
-    neighbours = points.take(index.reshape(len(points), k), axis=0)
-    # einsum sums over the middle axis several times faster than mean.
-    centred = neighbours - np.einsum("nki->ni", neighbours)[:, None] / k
-    values, vectors = np.linalg.eigh(np.swapaxes(centred, 1, 2) @ centred / k)
-    normals = vectors[:, :, 0]
+    # All neighbours several times over tell the same.
+    times = -(-_FEWEST // k)
+    cloud = small_gicp.PointCloud(np.tile(points, (times, 1)))
+    # Each point's normal is its own sum, so the number of threads changes nothing.
+    tree = small_gicp.KdTree(cloud, num_threads=n_workers())
+    small_gicp.estimate_normals(cloud, tree, times * k, n_workers())
+    found: Array = cloud.normals()[: len(points), :3]
     towards = np.array([0.0, 0.0, 1.0]) if viewpoint is None else viewpoint - points
-    away = np.sum(normals * towards, axis=1) < 0.0
-    normals = np.where(away[:, None], -normals, normals)
-    return Surface(normals, (values[:, 1] - values[:, 0]) / np.maximum(values[:, 2], 1e-30))
+    away = np.einsum("ni,ni->n", found, np.broadcast_to(towards, found.shape)) < 0.0
+    return np.where(away[:, None], -found, found)

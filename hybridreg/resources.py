@@ -28,6 +28,11 @@ def n_threads() -> int:
     return int(said) if said.isdigit() and int(said) > 0 else -1
 
 
+def n_workers() -> int:
+    """The same as a number of threads, for libraries to which -1 means nothing."""
+    return n_threads() if n_threads() > 0 else os.cpu_count() or 1
+
+
 def reset_peak_memory() -> None:
     """Start counting peak memory anew, where the system can (Linux)."""
     try:

@@ -33,7 +33,6 @@ class View:
     Attributes
     ----------
     points, normals : (n, 3) float64
-    planarity : (n,) float64
     tree : KD-tree of the points
     image : RangeImage or None
         None where the sensor's place is not known.
@@ -43,7 +42,6 @@ class View:
 
     points: Array
     normals: Array
-    planarity: Array
     tree: cKDTree
     image: RangeImage | None
     asked: NDArray[np.int64]
@@ -58,19 +56,14 @@ def views(scene: Scene) -> tuple[View, View]:
 
 def spacing(scene: Scene) -> float:
     """Resolution of the evidence, metres."""
-    # A share of a large cloud reaches as far as the whole.
-    clouds = [
-        cloud.points[:: max(1, len(cloud) // _MOST_POINTS)]
-        for cloud in (scene.pair.source, scene.pair.target)
-    ]
-    return scene.shared(("verdict", "spacing"), lambda: default_voxel(*clouds))
+    return scene.shared(("verdict", "spacing"), lambda: default_voxel(scene.pair.source, scene.pair.target))
 
 
 def _view(scene: Scene, side: Side) -> View:
     level: Level = getattr(scene, side)
     wanted = spacing(scene)
     if len(level) <= _MOST_POINTS and 1 / _NEAR_ENOUGH < level.spacing / wanted < _NEAR_ENOUGH:
-        points, tree, surface = level.points, normals.tree(scene, side), normals.surface(scene, side)
+        points, tree, surface = level.points, normals.tree(scene, side), normals.of(scene, side)
     else:
         from hybridreg.classical.voxel import voxel_centroids
 
@@ -79,8 +72,7 @@ def _view(scene: Scene, side: Side) -> View:
     asked = np.unique(np.linspace(0, len(points) - 1, min(_N_ASKED, len(points))).astype(np.int64))
     return View(
         points=points,
-        normals=surface.normals,
-        planarity=surface.planarity,
+        normals=surface,
         tree=tree,
         image=_image(scene, side),
         asked=asked,

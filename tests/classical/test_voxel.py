@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from hybridreg import Pair, VoxelGrid
 from hybridreg.classical import voxel as module
 from hybridreg.classical.voxel import voxel_centroids
-from hybridreg.resolution import default_voxel, reach
+from hybridreg.resolution import default_voxel
 
 clouds = st.builds(
     lambda seed, n, spread: np.random.default_rng(seed).normal(size=(n, 3)) * spread,
@@ -89,27 +89,31 @@ def test_derived_voxel_follows_the_scale_and_is_noted() -> None:
     points = np.random.default_rng(0).normal(size=(4000, 3)) * 20
     pair = Pair.of(points, points * 1.5)
     scene = VoxelGrid()(pair)
-    assert scene.spacing == default_voxel(points, points * 1.5) == pytest.approx(reach(points) / 60, rel=0.05)
+    reach = np.quantile(np.linalg.norm(points - np.median(points, axis=0), axis=1), 0.9)
+    assert scene.spacing == default_voxel(pair.source, pair.target) == pytest.approx(reach / 60, rel=0.05)
     assert scene.notes == [f"voxel {scene.spacing:.3g} m, derived from the clouds' reach"]
-    assert default_voxel(points * 1000, points * 1000) == pytest.approx(1000 * default_voxel(points, points))
+    far = Pair.of(points * 1000, points * 1500)
+    assert default_voxel(far.source, far.target) == pytest.approx(1000 * scene.spacing)
 
 
 def test_derived_voxel_leaves_no_cloud_too_many_points() -> None:
     # One sensor sees a corner of what the other sees: a sixtieth of its reach would cut that into very many cells.
     rng = np.random.default_rng(0)
     near, wide = rng.uniform(-3, 3, (2000, 3)), rng.uniform(-30, 30, (80_000, 3))
-    scene = VoxelGrid()(Pair.of(near, wide))
-    reached = default_voxel(near, wide)
+    pair = Pair.of(near, wide)
+    scene = VoxelGrid()(pair)
+    reached = default_voxel(pair.source, pair.target)
     assert len(scene.target) <= 30_000
     assert len(scene.target) > 20_000
     assert scene.source.spacing == scene.target.spacing > reached
     assert scene.notes == [
         f"voxel {scene.spacing:.3g} m, derived from the clouds' reach ({reached:.3g} m) and the number of points"
     ]
-    assert len(VoxelGrid(voxel=reached)(Pair.of(near, wide)).target) > 70_000
+    assert len(VoxelGrid(voxel=reached)(pair).target) > 70_000
 
 
 def test_derived_voxel_of_a_cloud_that_is_nearly_one_place() -> None:
     points = np.zeros((100, 3))
     points[:3] = np.eye(3)
-    assert default_voxel(points, points) > 0
+    pair = Pair.of(points, points + np.eye(3)[0])
+    assert default_voxel(pair.source, pair.target) > 0
