@@ -62,11 +62,15 @@ class Gicp(Stage):
         target, target_tree = _prepared(scene, "target", voxel, self.neighbours)
         T = pose.T
         distances = self.max_distances or (5 * scene.spacing, 2.5 * scene.spacing, 1.25 * scene.spacing)
+        rests = False
         for distance in distances:
-            # Only the last round needs to rest.
-            still = 1.0 if distance == distances[-1] else _COARSE
+            last = distance == distances[-1]
+            # What rested at once does so a little nearer too. Only the last round needs to rest exactly.
+            if rests and not last:
+                continue
+            still = 1.0 if last else _COARSE
             # One thread: with more, the order of summation and so the last digits depend on the machine.
-            T = small_gicp.align(
+            found = small_gicp.align(
                 target,
                 source,
                 target_tree,
@@ -76,7 +80,8 @@ class Gicp(Stage):
                 rotation_epsilon=still * _STILL_RAD,
                 translation_epsilon=still * _STILL_M,
                 num_threads=1,
-            ).T_target_source
+            )
+            T, rests = found.T_target_source, found.iterations <= 1
         return not_worse(scene, pose, np.asarray(T))
 
 

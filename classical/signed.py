@@ -22,8 +22,10 @@ def signed(view: FromAbove, turn: complex, n: int, cell: float) -> Floats:
 
     The place (0, 0) is the lower corner of the cell [0, 0]; `cell` is its edge in metres.
     """
-    free, filled = (_any(columns, turn, n, view.n_layers, cell) for columns in (view.free, view.filled))
-    return np.where(filled, np.float32(1.0), _FREE * free)
+    evidence = np.zeros(view.n_layers * n * n, dtype=np.float32)
+    evidence[_cells(view.free, turn, n, cell)] = _FREE
+    evidence[_cells(view.filled, turn, n, cell)] = 1.0
+    return evidence.reshape(view.n_layers, n, n)
 
 
 def blurred(evidence: Floats) -> Floats:
@@ -36,9 +38,7 @@ def blurred(evidence: Floats) -> Floats:
     return spread
 
 
-def _any(columns: Columns, turn: complex, n: int, n_layers: int, cell: float) -> NDArray[np.bool_]:
+def _cells(columns: Columns, turn: complex, n: int, cell: float) -> NDArray[np.int64]:
     turned = columns.places * (turn / cell)
     i, j = np.floor(turned.real).astype(np.int64) % n, np.floor(turned.imag).astype(np.int64) % n
-    held = np.zeros(n_layers * n * n, dtype=bool)
-    held[(columns.layer * n + i) * n + j] = True
-    return held.reshape(n_layers, n, n)
+    return (columns.layer * n + i) * n + j

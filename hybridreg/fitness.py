@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 
 # From so many queries on their order counts: a large tree does not fit the processor's cache, and queries of one place
 # after another ask for the same part of it. Half a million in random order took three times as long.
-_MANY = 100_000
+_MANY = 300_000
 _MOST_CELLS = 2**20  # along an axis, so that three numbers of a cell go into one key
 
 
@@ -46,7 +46,7 @@ def measure(source: Array, target: cKDTree | Array, T: Array, max_distance: floa
     max_distance : float
         Metres; a neighbour must be nearer than this.
     """
-    tree = target if isinstance(target, cKDTree) else cKDTree(target)
+    tree = target if isinstance(target, cKDTree) else cKDTree(target, balanced_tree=False)
     distance, index = _nearest(tree, se3.apply(T, source), max_distance)
     hit = np.isfinite(distance)
     rows = np.flatnonzero(hit)

@@ -29,7 +29,7 @@ _SAME_NORMAL = float(np.cos(np.radians(45.0)))
 # Points looked at for nothing, added to every count: so few agreeing points are a coincidence.
 _FEW = 20.0
 # Fixed-point steps to the main axes; each about squares the error.
-_TURNS = 8
+_TURNS = 12
 # Without a range image a point counts as looked at where the other cloud has anything within so many spacings.
 _SURROUNDED = 6.0
 

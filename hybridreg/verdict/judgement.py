@@ -3,15 +3,16 @@
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from hybridreg import se3
 from hybridreg.fitness import Fitness, measure
 from hybridreg.matches import Correspondences, Pose
+from hybridreg.resources import n_workers
 from hybridreg.scene import Scene
 from hybridreg.verdict import information, rivals, support, views
 from hybridreg.verdict.agreement import Agreement, OneWay, compare
@@ -122,7 +123,7 @@ def _weigh(scene: Scene, pose: Pose) -> Weighed:
     spacing = views.spacing(scene)
     agreement = compare(source, target, pose.T, spacing)
     held = information.measure(agreement, target)
-    found = rivals.find(source, target, pose.T, agreement, held, pose.rivals, spacing) if pose.found else []
+    found = rivals.find(scene, pose.T, agreement, held, pose.rivals) if pose.found else []
     evidence = evidence_of(agreement, held, found, target, pose.recipes)
     return Weighed(
         agreement=agreement, held=held, rivals=found, evidence=evidence, confidence=confidence(evidence)
@@ -186,12 +187,11 @@ def _images(source: View, target: View) -> tuple[str, ...]:
 
 def _fitness(scene: Scene, T: Array, max_distance: float) -> tuple[Fitness, float]:
     source, target = scene.pair.source.points, scene.pair.target.points
-    tree_source = scene.shared(("cloud tree", "source"), lambda: cKDTree(source, balanced_tree=False))
-    tree_target = scene.shared(("cloud tree", "target"), lambda: cKDTree(target, balanced_tree=False))
-    return (
-        measure(source, tree_target, T, max_distance),
-        measure(target, tree_source, se3.inverse(T), max_distance).fitness,
-    )
+    # Side by side, as one thread alone builds a tree.
+    with ThreadPoolExecutor(min(2, n_workers())) as pool:
+        forth = pool.submit(measure, source, target, T, max_distance)
+        back = pool.submit(measure, target, source, se3.inverse(T), max_distance)
+        return forth.result(), back.result().fitness
 
 
 def _close(found: list[Rival], support: float) -> Array:

@@ -39,16 +39,28 @@ class Rival(NamedTuple):
 
 
 def best_first(scene: Scene, starts: Sequence[Array]) -> list[Rival]:
-    """The best supported of `starts` (4, 4), at most eight, each where it fits best; of those that meet, one."""
+    """The best supported of `starts` (4, 4), at most eight, each where it fits best; of those that meet, one.
+
+    What came out before in the same run rests where it is, and is not settled again.
+    """
+    known = _known(scene)
+    resting = [known[one.tobytes()] for one in starts if one.tobytes() in known]
+    quickly = [_settled(scene, one, _ROUGHLY) for one in starts if one.tobytes() not in known]
+    found = [*resting, *(_settled(scene, one.T, 1) for one in distinct(scene, quickly)[:_KEPT])]
+    known.update((one.T.tobytes(), one) for one in found)
+    return distinct(scene, found)[:_KEPT]
+
+
+def _settled(scene: Scene, start: Array, every: int) -> Rival:
     source, target = views.views(scene)
     spacing = views.spacing(scene)
+    T = settle(source, target, start, spacing, every=3 * every)
+    return Rival(T, support.of(source, target, T, spacing, every))
 
-    def settled(start: Array, every: int) -> Rival:
-        T = settle(source, target, start, spacing, every=3 * every)
-        return Rival(T, support.of(source, target, T, spacing, every))
 
-    quickly = distinct(scene, [settled(start, _ROUGHLY) for start in starts])
-    return distinct(scene, [settled(rival.T, 1) for rival in quickly[:_KEPT]])
+def _known(scene: Scene) -> dict[bytes, Rival]:
+    # Settled poses of the run, by their matrices.
+    return scene.shared(("verdict", "settled"), dict)
 
 
 def distinct(scene: Scene, found: Iterable[Rival]) -> list[Rival]:
@@ -76,13 +88,7 @@ def counted(scene: Scene, found: Iterable[Rival], answers: Iterable[Iterable[Riv
 
 
 def find(
-    source: View,
-    target: View,
-    T: Array,
-    agreement: Agreement,
-    information: Information,
-    offered: Array,
-    spacing: float,
+    scene: Scene, T: Array, agreement: Agreement, information: Information, offered: Array
 ) -> list[Rival]:
     """Settled rivals of pose T, the best supported first.
 
@@ -91,19 +97,29 @@ def find(
     offered : (r, 4, 4)
         Rivals that the estimator knows of.
     """
+    source, target = views.views(scene)
+    spacing = views.spacing(scene)
+    known = _known(scene)
+
+    def promise(guess: Array) -> float:
+        settled = known.get(guess.tobytes())
+        return settled.support if settled else support.of(source, target, guess, spacing, every=_QUICK)
+
     guesses = [
         *offered[:_OFFERED],
         *_turned(source, target, T, agreement, information),
         *_slid(T, agreement, spacing),
     ]
     guesses = [guess for guess in guesses if differs(guess, T, information.centre, spacing)]
-    promising = sorted(guesses, key=lambda G: -support.of(source, target, G, spacing, every=_QUICK))
     found: list[Rival] = []
-    for guess in promising[:_SETTLED]:
-        G = settle(source, target, guess, spacing)
+    for guess in sorted(guesses, key=promise, reverse=True)[:_SETTLED]:
+        rival = known.get(guess.tobytes())
+        if rival is None:
+            G = settle(source, target, guess, spacing)
+            rival = Rival(G, support.of(source, target, G, spacing, every=_CLOSE))
         # Guesses that come back to the pose are no rivals, and must not hide those behind them.
-        if differs(G, T, information.centre, spacing):
-            found.append(Rival(G, support.of(source, target, G, spacing, every=_CLOSE)))
+        if differs(rival.T, T, information.centre, spacing):
+            found.append(rival)
         if len(found) == _CLOSELY:
             break
     return sorted(found, key=lambda rival: -rival.support)
