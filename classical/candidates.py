@@ -102,7 +102,7 @@ class Candidates(Stage):
         T = self.refine(scene, Pose(settled.T)).T
         value = support.of(*views.views(scene), T, views.spacing(scene))
         # Along a corridor a refinement may slide away; else it is nearer than what settled, whatever its support.
-        return Rival(T, value) if value > settled.support - _NOISE else settled
+        return Rival(T, value) if value > settled.by_surfaces - _NOISE else settled
 
 
 def _best_of(found: list[Rival]) -> Pose:
@@ -132,7 +132,7 @@ def _pose(entry: Entry, scene: Scene, matches: Correspondences, rng: np.random.G
         for stage in entry.values():
             fitting.check_stage_image(stage, scene.pair)
         if "match" in entry:
-            matches = entry["match"](scene, entry.get("overlap", NoOverlap())(scene))
+            matches = scene.matched(entry["match"](scene, entry.get("overlap", NoOverlap())(scene)))
         return entry["estimate"](scene, matches, rng)
     except (ValueError, ImportError, OSError) as error:
         scene.note(

@@ -161,6 +161,8 @@ class Pipeline(Stage):
 
     def trace(self, pair: Pair, *, seed: int = 0, matches: Any = None) -> Trace:
         """Run the stages and keep what each of them made."""
+        from hybridreg.verdict.matched import of_most
+
         fitting.check_image(self, pair)
         fitting.check_seed(seed)
         rng = np.random.default_rng([seed, zlib.crc32(pair.id.encode())])
@@ -175,13 +177,15 @@ class Pipeline(Stage):
             overlap = self.overlap(scene)
         with stopwatch(seconds, "match"):
             if matches is None:
-                found = self.match(scene, overlap)
+                found = scene.matched(self.match(scene, overlap))
             else:
-                found = lower_matches(matches, pair)
+                found = scene.matched(lower_matches(matches, pair))
         with stopwatch(seconds, "estimate"):
             estimated = _proper(self.estimate(scene, found, rng))
         with stopwatch(seconds, "refine"):
             refined = _proper(self.refine(scene, estimated)) if estimated.found else estimated
+        if not len(found):  # an estimator that runs recipes of its own may have matched
+            found = of_most(scene, refined.T)
         return Trace(scene, overlap, found, estimated, refined, seconds)
 
 

@@ -47,7 +47,8 @@ class RegistrationResult:
     rivals : (r, 4, 4) float64
         Other poses that explain the data nearly as well.
     matches : Correspondences
-        What the pose was estimated from, in the coordinates that the user gave.
+        What the pose was estimated from, in the coordinates that the user gave; where several matchers ran, those
+        matches that agree with the pose best.
     evidence : mapping of str to float
         The numbers behind the verdict.
     notes : tuple of str

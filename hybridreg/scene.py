@@ -10,6 +10,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from hybridreg.matches import Correspondences
 from hybridreg.pair import Pair
 
 Array = NDArray[np.float64]
@@ -48,12 +49,15 @@ class Scene:
     source, target : Level
     notes : list of str
         What a stage wants the user to read in the result: a default it chose, a cap that bit.
+    matches : list of Correspondences
+        What the run's matchers found so far, each with one match at least.
     """
 
     pair: Pair
     source: Level
     target: Level
     notes: list[str] = field(default_factory=list)
+    matches: list[Correspondences] = field(default_factory=list)
     _shared: dict[Hashable, Any] = field(default_factory=dict, repr=False)
 
     @property
@@ -67,6 +71,12 @@ class Scene:
             self._shared[key] = make()
         value: Value = self._shared[key]
         return value
+
+    def matched(self, found: Correspondences) -> Correspondences:
+        """Remember what a matcher found, as evidence for or against every pose."""
+        if len(found):
+            self.matches.append(found)
+        return found
 
     def note(self, text: str) -> None:
         """Leave a sentence for the result, once."""

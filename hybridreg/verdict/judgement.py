@@ -14,7 +14,7 @@ from hybridreg.fitness import Fitness, measure
 from hybridreg.matches import Correspondences, Pose
 from hybridreg.resources import n_workers
 from hybridreg.scene import Scene
-from hybridreg.verdict import information, rivals, support, views
+from hybridreg.verdict import information, matched, rivals, support, views
 from hybridreg.verdict.agreement import Agreement, OneWay, compare
 from hybridreg.verdict.confidence import NEARLY, NO_RIVAL, Word, confidence, word
 from hybridreg.verdict.information import Information
@@ -88,8 +88,7 @@ def judge(scene: Scene, pose: Pose, matches: Correspondences) -> Judgement:
     same whatever voxel the pipeline used. A pose that was not found is judged as what it is, a placeholder: failed.
     """
     weighed = weigh(scene, pose)
-    distance = 2.0 * (matches.spacing or scene.spacing)
-    evidence = {**weighed.evidence, "matches_agreeing": _agreeing(matches, pose.T, distance)}
+    evidence = {**weighed.evidence, "matches_agreeing": float(matched.agreeing(scene, matches, pose.T))}
     probability = weighed.confidence if pose.found else 0.0
     max_distance = 2.0 * scene.spacing
     fitness, fitness_target = _fitness(scene, pose.T, max_distance)
@@ -111,11 +110,13 @@ def judge(scene: Scene, pose: Pose, matches: Correspondences) -> Judgement:
 def weigh(scene: Scene, pose: Pose) -> Weighed:
     """Evidence and confidence of a pose and its rivals, without what only the result needs.
 
-    Computed once for a pose: an estimator that weighed its answer spares the verdict the work.
+    Computed once for a pose, until another matcher has run: an estimator that weighed its answer spares the verdict
+    the work.
     """
     # Rounded, as the pipeline makes the rotation of a pose exact to the last digit.
     key = tuple(np.round([pose.T, *pose.rivals], 9).ravel())
-    return scene.shared(("weighed", pose.found, pose.recipes, key), lambda: _weigh(scene, pose))
+    known = ("weighed", pose.found, pose.recipes, len(scene.matches), key)
+    return scene.shared(known, lambda: _weigh(scene, pose))
 
 
 def _weigh(scene: Scene, pose: Pose) -> Weighed:
@@ -124,14 +125,14 @@ def _weigh(scene: Scene, pose: Pose) -> Weighed:
     agreement = compare(source, target, pose.T, spacing)
     held = information.measure(agreement, target)
     found = rivals.find(scene, pose.T, agreement, held, pose.rivals) if pose.found else []
-    evidence = evidence_of(agreement, held, found, target, pose.recipes)
+    evidence = evidence_of(agreement, held, found, target, pose.recipes, matched.share(scene, pose.T))
     return Weighed(
         agreement=agreement, held=held, rivals=found, evidence=evidence, confidence=confidence(evidence)
     )
 
 
 def evidence_of(
-    agreement: Agreement, held: Information, found: list[Rival], target: View, recipes: int
+    agreement: Agreement, held: Information, found: list[Rival], target: View, recipes: int, matched: float
 ) -> dict[str, float]:
     """The numbers behind a verdict; shares lie between 0 and 1.
 
@@ -147,10 +148,11 @@ def evidence_of(
     inlier_rmse : of the agreeing points to the other cloud's planes, metres
     weakest : smallest eigenvalue of the information per point, at most 1/3
     recipes : methods that came to the pose independently of one another
+    matched : agreeing share of the matches of that matcher of which most agree; 0 where none ran
     support : log-odds that the pose is right, were there no other
     rival_margin : how far the best rival's support lies above it (-20 without rivals)
     """
-    own = support.numbers(agreement, held, recipes)
+    own = support.numbers(agreement, held, recipes, matched)
     of_pose = support.support(own)
     evidence = {
         **own,
@@ -174,11 +176,6 @@ def _surfaces(way: OneWay, target: View) -> dict[str, float]:
         "normals": float(cosine.mean()) if near.any() else 0.0,
         "inlier_rmse": float(np.sqrt(np.mean(across**2))) if agrees.any() else 0.0,
     }
-
-
-def _agreeing(matches: Correspondences, T: Array, distance: float) -> float:
-    gap = np.linalg.norm(se3.apply(T, matches.source) - matches.target, axis=1)
-    return float(np.count_nonzero(gap < distance))
 
 
 def _images(source: View, target: View) -> tuple[str, ...]:

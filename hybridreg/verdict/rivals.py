@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from hybridreg import se3
 from hybridreg.scene import Scene
-from hybridreg.verdict import support, views
+from hybridreg.verdict import matched, support, views
 from hybridreg.verdict.agreement import Agreement
 from hybridreg.verdict.information import Information
 from hybridreg.verdict.settle import settle
@@ -31,11 +31,18 @@ _KEPT = 8
 
 
 class Rival(NamedTuple):
-    """A pose (4, 4), its support (log-odds), and how many recipes came to it."""
+    """A pose (4, 4), its support by the surfaces alone (log-odds), how many recipes came to it, and the share of
+    matches that agrees with it."""
 
     T: Array
-    support: float
+    by_surfaces: float
     recipes: int = 1
+    matched: float = 0.0
+
+    @property
+    def support(self) -> float:
+        """Log-odds that the pose is right, were there no other."""
+        return self.by_surfaces + support.beside(self.recipes, self.matched)
 
 
 def best_first(scene: Scene, starts: Sequence[Array]) -> list[Rival]:
@@ -75,14 +82,14 @@ def distinct(scene: Scene, found: Iterable[Rival]) -> list[Rival]:
 
 
 def counted(scene: Scene, found: Iterable[Rival], answers: Iterable[Iterable[Rival]]) -> list[Rival]:
-    """The same poses, the best supported first, with the number of recipes whose `answers` hold them."""
+    """The same poses, the best supported first, with the number of recipes whose `answers` hold them, and with the
+    share of matches that agrees with each."""
     middle, spacing = views.views(scene)[0].points.mean(axis=0, keepdims=True), views.spacing(scene)
 
     def told(one: Rival) -> Rival:
         centre = se3.apply(one.T, middle)[0]
         came = [any(not differs(other.T, one.T, centre, spacing) for other in answer) for answer in answers]
-        n = max(sum(came), 1)
-        return Rival(one.T, one.support + support.found_by(n) - support.found_by(one.recipes), n)
+        return one._replace(recipes=max(sum(came), 1), matched=matched.share(scene, one.T))
 
     return sorted(map(told, found), key=lambda rival: -rival.support)
 
@@ -103,7 +110,8 @@ def find(
 
     def promise(guess: Array) -> float:
         settled = known.get(guess.tobytes())
-        return settled.support if settled else support.of(source, target, guess, spacing, every=_QUICK)
+        seen = settled.by_surfaces if settled else support.of(source, target, guess, spacing, every=_QUICK)
+        return Rival(guess, seen, matched=matched.share(scene, guess)).support
 
     guesses = [
         *offered[:_OFFERED],
@@ -119,7 +127,7 @@ def find(
             rival = Rival(G, support.of(source, target, G, spacing, every=_CLOSE))
         # Guesses that come back to the pose are no rivals, and must not hide those behind them.
         if differs(rival.T, T, information.centre, spacing):
-            found.append(rival)
+            found.append(rival._replace(matched=matched.share(scene, rival.T)))
         if len(found) == _CLOSELY:
             break
     return sorted(found, key=lambda rival: -rival.support)

@@ -62,15 +62,19 @@ def terms(evidence: Mapping[str, float]) -> dict[str, float]:
         "looked_through_less": min(through),
         "log_weakest": float(np.log10(evidence["weakest"] + _UNHELD)),
         "log_recipes": float(np.log(evidence["recipes"])),
+        "matched": evidence["matched"],
     }
 
 
-def found_by(recipes: int) -> float:
-    """What it adds to a pose's support that so many recipes came to it."""
-    return model().weights["log_recipes"] * float(np.log(recipes))
+def beside(recipes: int, matched: float) -> float:
+    """What it adds to a pose's support that so many recipes came to it, and that this share of matches agrees."""
+    weights = model().weights
+    return weights["log_recipes"] * float(np.log(recipes)) + weights["matched"] * matched
 
 
-def numbers(agreement: Agreement, held: Information, recipes: int = 1) -> dict[str, float]:
+def numbers(
+    agreement: Agreement, held: Information, recipes: int = 1, matched: float = 0.0
+) -> dict[str, float]:
     """What tells of one pose by itself; see `hybridreg.verdict.judgement.evidence_of`."""
     least, middle, most = np.sort(agreement.shares)
     found = {
@@ -81,6 +85,7 @@ def numbers(agreement: Agreement, held: Information, recipes: int = 1) -> dict[s
         "looked_through": agreement.looked_through,
         "weakest": held.weakest,
         "recipes": recipes,
+        "matched": matched,
     }
     for side, way in (("source", agreement.source), ("target", agreement.target)):
         found[f"looked_through_{side}"] = share(way.free, way.looked)
@@ -94,6 +99,6 @@ def share(part: Mask, whole: Mask) -> float:
 
 
 def of(source: View, target: View, T_target_source: Array, spacing: float, every: int = 1) -> float:
-    """Support of a pose (4, 4), from `every` so-many-th of the asked points."""
+    """Support of a pose (4, 4) by the surfaces alone, from `every` so-many-th of the asked points."""
     agreement = compare(source, target, T_target_source, spacing, every=every)
     return support(numbers(agreement, information.measure(agreement, target)))

@@ -125,6 +125,41 @@ def test_a_pose_that_several_entries_came_to_counts_as_many_recipes() -> None:
     assert belief.evidence["recipes"] == 2.0
 
 
+@dataclass(frozen=True, kw_only=True)
+class Matches:
+    """Matches that are right under the true pose, and some that are right under none."""
+
+    right: int = 0
+    gives: ClassVar[frozenset[str]] = frozenset()
+
+    def __call__(self, scene: hr.Scene, overlap: hr.Overlap) -> hr.Correspondences:
+        source = scene.source.points[:40]
+        far = np.where(np.arange(40) < self.right, 0.0, 30.0)[:, None]
+        return hr.Correspondences.of(source, se3.apply(TRUTH, source) + far)
+
+
+def test_matches_that_agree_with_a_pose_speak_for_it() -> None:
+    few, many = ({"match": Matches(right=n), **offers("one", TRUTH)} for n in (4, 32))
+    confidence = []
+    for entry, share in ((few, 0.1), (many, 0.8)):
+        scene = sample_scene()[0]
+        found = weigh(scene, run(entry, scene=scene))
+        assert found.evidence["matched"] == share
+        confidence.append(found.confidence)
+    assert confidence[0] < confidence[1]
+
+
+def test_a_result_has_the_matches_that_agree_with_it_best() -> None:
+    entries = ({"match": Matches(right=n), **offers("one", TRUTH)} for n in (4, 32, 8))
+    pipeline = hr.Pipeline(match="none", estimate=hr.Candidates(of=tuple(entries), enough=1.0), refine="none")
+    result = pipeline.run(SCENE.pair)
+    gap = np.linalg.norm(
+        se3.apply(result.transformation, result.matches.source) - result.matches.target, axis=1
+    )
+    assert np.count_nonzero(gap < 1.0) == 32
+    assert result.evidence["matches_agreeing"] == 32.0
+
+
 def test_what_every_entry_found_can_be_followed() -> None:
     entries = (offers("one", WRONG), offers("nothing"), offers("two", TRUTH))
     stages = list(hr.Candidates(of=entries).stages(sample_scene()[0], NONE, np.random.default_rng(0)))

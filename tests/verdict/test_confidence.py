@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hybridreg.verdict.confidence import FAILED, NEARLY, NO_RIVAL, OK, confidence, word
-from hybridreg.verdict.support import found_by, model, support, terms
+from hybridreg.verdict.support import beside, model, support, terms
 
 share = st.floats(0.0, 1.0)
 EVIDENCE = {
@@ -19,6 +19,7 @@ EVIDENCE = {
     "looked_through_target": share,
     "weakest": st.floats(0.0, 1.0 / 3.0),
     "recipes": st.integers(1, 5),
+    "matched": share,
 }
 own = st.fixed_dictionaries(EVIDENCE)
 log_odds = st.floats(-15.0, 15.0)
@@ -51,16 +52,19 @@ def test_the_rule_weighs_the_terms_and_nothing_else() -> None:
         "looked_through_target": 0.05,
         "weakest": 0.02,
         "recipes": 1,
+        "matched": 0.4,
     }
     assert set(model().weights) == set(terms(numbers))
     assert support({**numbers, "normals": 0.9}) == support(numbers)
 
 
 @given(own)
-def test_each_recipe_that_came_to_a_pose_adds_to_its_support(numbers: dict[str, float]) -> None:
-    one, three = ({**numbers, "recipes": n} for n in (1, 3))
-    assert support(three) - support(one) == pytest.approx(found_by(3) - found_by(1))
-    assert found_by(1) == 0.0 < found_by(2) < found_by(3)
+def test_recipes_that_came_to_a_pose_and_matches_that_agree_add_to_its_support(
+    numbers: dict[str, float],
+) -> None:
+    alone, joined = ({**numbers, "recipes": n, "matched": share} for n, share in ((1, 0.0), (3, 0.5)))
+    assert support(joined) - support(alone) == pytest.approx(beside(3, 0.5))
+    assert beside(1, 0.0) == 0.0 < beside(2, 0.0) < beside(3, 0.0) < beside(3, 0.1) < beside(3, 0.2)
 
 
 @given(log_odds, log_odds, st.floats(0.0, 5.0))
