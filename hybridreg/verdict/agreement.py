@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from hybridreg import se3
 from hybridreg.range_image import Seen
+from hybridreg.verdict.axes import faced, main_axes
 from hybridreg.verdict.views import View
 
 Array = NDArray[np.float64]
@@ -28,8 +29,6 @@ _COVERED, _ACROSS, _MARGIN, _REACH = 2.0, 0.5, 1.0, 1.0
 _SAME_NORMAL = float(np.cos(np.radians(45.0)))
 # Points looked at for nothing, added to every count: so few agreeing points are a coincidence.
 _FEW = 20.0
-# Fixed-point steps to the main axes; each about squares the error.
-_TURNS = 12
 # Without a range image a point counts as looked at where the other cloud has anything within so many spacings.
 _SURROUNDED = 6.0
 
@@ -93,7 +92,7 @@ def compare(source: View, target: View, T_target_source: Array, spacing: float, 
     axes = main_axes(*facing)
     looked, agreed, through = np.zeros(3), np.zeros(3), np.zeros(3)
     for way, normals in zip((forward, backward), facing, strict=True):
-        axis = np.argmax(np.abs(normals @ axes.T), axis=1)
+        axis = faced(normals, axes)
         for count, mask in ((looked, way.looked), (agreed, way.looked & way.agrees), (through, way.free)):
             count += np.bincount(axis[mask], minlength=3)
     return Agreement(
@@ -104,27 +103,6 @@ def compare(source: View, target: View, T_target_source: Array, spacing: float, 
         agreed=every * agreed,
         through=every * through,
     )
-
-
-def main_axes(*facing: Array) -> Array:
-    """Three orthogonal directions (3, 3), rows, along which the normals of one or more clouds gather, the commonest
-    first; each cloud has the same say.
-
-    Eigenvectors of the normals' scatter alone lie askew where two directions are equally common (the floor and the
-    walls of a room). From there the sum of fourth powers of the normals' components is made as large as a rotation
-    can, the fixed point that independent component analysis uses for kurtosis.
-    """
-    normals = np.concatenate(facing)
-    weight = np.concatenate([np.full(len(n), 1.0 / len(n)) for n in facing])[:, None]
-    axes = np.linalg.eigh((weight * normals).T @ normals)[1].T
-    for _ in range(_TURNS):
-        along = normals @ axes.T
-        U, _, Vt = np.linalg.svd(
-            (weight * (along * along * along)).T @ normals
-        )  # ** 3 takes five times as long
-        axes = U @ Vt
-    share = np.bincount(np.argmax(np.abs(normals @ axes.T), axis=1), weights=weight[:, 0], minlength=3)
-    return axes[np.argsort(-share)]
 
 
 def one_way(a: View, rows: NDArray[np.int64], b: View, T_b_a: Array, spacing: float) -> OneWay:

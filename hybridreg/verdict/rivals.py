@@ -61,7 +61,7 @@ def best_first(scene: Scene, starts: Sequence[Array]) -> list[Rival]:
 def _settled(scene: Scene, start: Array, every: int) -> Rival:
     source, target = views.views(scene)
     spacing = views.spacing(scene)
-    T = settle(source, target, start, spacing, every=3 * every)
+    T = settle(source, target, start, spacing, every=3 * every, wide=every == 1)
     return Rival(T, support.of(source, target, T, spacing, every))
 
 

@@ -12,15 +12,24 @@ from hybridreg.verdict.views import View
 
 Array = NDArray[np.float64]
 
-# Search distances of the steps, in spacings: wide enough to pull in a guess that is some cells off, then tight.
-_STEPS = (6.0, 4.0, 3.0, 2.0, 2.0)
+# Search distances of the steps, in spacings: wide enough to pull in a guess that is some cells off, then tight; and
+# for a guess that may be two or three metres off.
+_STEPS, _WIDE = (6.0, 4.0, 3.0, 2.0, 2.0), (12.0, 8.0, 5.0, 3.0, 2.0, 2.0)
+# Width of the weights where the search is wide, per search distance.
+_TRUST = 0.25
 _FEWEST = 30
 
 
-def settle(source: View, target: View, T: Array, spacing: float, every: int = 3) -> Array:
-    """Pose (4, 4) near T at which the source's asked points lie best on the target's planes."""
-    rows = source.asked[::every]
-    for step in _STEPS:
+def settle(
+    source: View, target: View, T: Array, spacing: float, *, every: int = 3, wide: bool = False
+) -> Array:
+    """Pose (4, 4) near T at which the source's settling points lie best on the target's planes.
+
+    From poses up to 4 degrees and 2 m off on simulated validation pairs, a narrow search after a wide one or before it
+    came back to the true pose more often than two of one kind.
+    """
+    rows = source.settling[::every]
+    for step in _WIDE if wide else _STEPS:
         moved = se3.apply(T, source.points[rows])
         distance, match = target.tree.query(moved, distance_upper_bound=step * spacing)
         hit = np.isfinite(distance)
@@ -30,7 +39,8 @@ def settle(source: View, target: View, T: Array, spacing: float, every: int = 3)
         normals = target.normals[match]
         gap = np.einsum("ni,ni->n", points - target.points[match], normals)
         # Cauchy weights: half of the neighbours of a wrong guess are no neighbours.
-        weight = 1.0 / (1.0 + (gap / spacing) ** 2)
+        width = spacing * max(1.0, _TRUST * step) if wide else spacing
+        weight = 1.0 / (1.0 + (gap / width) ** 2)
         centre = points.mean(axis=0)
         J = jacobian(points - centre, normals)
         H = (J * weight[:, None]).T @ J

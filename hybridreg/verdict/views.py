@@ -14,6 +14,7 @@ from hybridreg import normals
 from hybridreg.range_image import RangeImage
 from hybridreg.resolution import default_voxel
 from hybridreg.scene import Level, Scene
+from hybridreg.verdict.axes import balanced
 
 Array = NDArray[np.float64]
 Side = Literal["source", "target"]
@@ -38,6 +39,8 @@ class View:
         None where the sensor's place is not known.
     asked : (m,) int64
         Rows that are compared with the other cloud.
+    settling : (k,) int64
+        Rows by which a pose settles: surfaces that face each way equally often, in random order.
     """
 
     points: Array
@@ -45,6 +48,7 @@ class View:
     tree: cKDTree
     image: RangeImage | None
     asked: NDArray[np.int64]
+    settling: NDArray[np.int64]
 
 
 def views(scene: Scene) -> tuple[View, View]:
@@ -76,6 +80,7 @@ def _view(scene: Scene, side: Side) -> View:
         tree=tree,
         image=_image(scene, side),
         asked=asked,
+        settling=balanced(surface, _N_ASKED),
     )
 
 

@@ -11,7 +11,8 @@ from made_places import Made
 
 from hybridreg import se3
 from hybridreg.verdict import views
-from hybridreg.verdict.agreement import Agreement, compare, main_axes
+from hybridreg.verdict.agreement import Agreement, compare
+from hybridreg.verdict.axes import main_axes
 
 SHIFT = se3.from_rt(np.eye(3), np.array([3.0, 0.0, 0.0]))
 
