@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""The rule behind the verdict's confidence, fitted to what `default` considers on simulated training pairs.
+"""The rules behind the verdict, fitted to what `default` considers on simulated training pairs.
 
     python -m benchmarks.verdict_weights gather --rows runs/evidence.jsonl --pairs 40
-    python -m benchmarks.verdict_weights fit --rows runs/evidence.jsonl --write hybridreg/verdict/model.json
+    python -m benchmarks.verdict_weights fit --rows runs/evidence.jsonl --write hybridreg/verdict
 
 `gather` runs the recipes of `default` on `sim:train` (every tier, disjoint pairs too) and on the worlds of the
 verdict's tests (rooms, corridors, yards, woods), and writes one line for each answer: its evidence, that of its best
@@ -17,7 +17,7 @@ import argparse
 import json
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import hybridreg as hr
+from benchmarks.boosting import boost, plain
 from benchmarks.calibration import draw
 from benchmarks.made_sights import sight
 from hybridreg.data import open_dataset
@@ -33,7 +34,8 @@ from hybridreg.matches import Correspondences, Pose
 from hybridreg.pair import Pair
 from hybridreg.scene import Scene
 from hybridreg.verdict import weigh
-from hybridreg.verdict.confidence import NO_RIVAL, OK, confidence
+from hybridreg.verdict.boosted import Boosted
+from hybridreg.verdict.confidence import NO_RIVAL, OK, believed, features
 from hybridreg.verdict.rivals import Rival
 from hybridreg.verdict.support import terms
 
@@ -45,7 +47,7 @@ FIRST = 2000
 # A wrong answer where the right one was found would seldom be given: so much it counts, beside a right one.
 AS_IF = 0.15
 # Penalty on the squared weights of the standardised terms, per answer.
-RIDGE = 1e-3
+RIDGE = 3e-4
 
 
 def pairs(tier: str, indices: range) -> Iterator[tuple[str, Pair, Array | None, float]]:
@@ -123,8 +125,9 @@ def read(path: Path) -> list[Row]:
     return [json.loads(line) for line in path.read_text().splitlines()] if path.exists() else []
 
 
-def fit(rows: list[Row]) -> tuple[dict[str, float], float]:
-    """Weights of the terms and intercept that make the rows likeliest (`hybridreg.verdict.confidence`)."""
+def fit_support(rows: list[Row]) -> tuple[dict[str, float], float]:
+    """Weights of the terms and intercept under which the rows are likeliest: either the pose is right, or its best
+    rival is, or neither, each by the odds that its own terms give it."""
     from scipy.optimize import minimize
 
     own, rival, right, weight = _arrays(rows)
@@ -140,7 +143,12 @@ def fit(rows: list[Row]) -> tuple[dict[str, float], float]:
         nll = all_of_them - np.where(right, s, np.logaddexp(0.0, r))
         return float(weight @ nll + RIDGE * weight.sum() * v[:-1] @ v[:-1])
 
-    v = minimize(loss, np.zeros(own.shape[1] + 1), method="L-BFGS-B").x
+    # What speaks for a pose never speaks against it: the terms of looking through are the only objections.
+    sign = [
+        (None, 0.0) if name.startswith("looked_through") else (0.0, None)
+        for name in terms(rows[0]["evidence"])
+    ]
+    v = minimize(loss, np.zeros(len(sign) + 1), method="L-BFGS-B", bounds=[*sign, (None, None)]).x
     weights = v[:-1] / width
     return dict(zip(terms(rows[0]["evidence"]), weights.tolist(), strict=True)), float(
         v[-1] - middle @ weights
@@ -154,13 +162,39 @@ def _arrays(rows: list[Row]) -> tuple[Array, Array, NDArray[np.bool_], Array]:
     return own, rival, np.array([row["right"] for row in rows]), np.array([row["weight"] for row in rows])
 
 
-def predicted(rows: list[Row], weights: dict[str, float], intercept: float) -> Array:
+@dataclass(frozen=True)
+class Rule:
+    """What `fit` found: the support's terms and the confidence's trees."""
+
+    weights: dict[str, float]
+    intercept: float
+    trees: Boosted
+    stored_trees: dict[str, Any]
+
+
+def fit(rows: list[Row]) -> Rule:
+    """The rule under which the rows are likeliest: support first, then trees on what it says and the rest."""
+    weights, intercept = fit_support(rows)
+    told = [features(evidence) for evidence in _with_support(rows, weights, intercept)]
+    right, weight = np.array([row["right"] for row in rows]), np.array([row["weight"] for row in rows])
+    stored = plain(boost(told, right, weight))
+    return Rule(weights, intercept, Boosted.read(stored), stored)
+
+
+def _with_support(rows: list[Row], weights: dict[str, float], intercept: float) -> Iterator[dict[str, float]]:
+    # The evidence, with support and margin as this rule tells them.
+    for row in rows:
+        own, *rival = (
+            intercept + sum(weights[name] * value for name, value in terms(evidence).items())
+            for evidence in (row["evidence"], *row["rival"])
+        )
+        yield {**row["evidence"], "support": own, "rival_margin": rival[0] - own if rival else NO_RIVAL}
+
+
+def predicted(rows: list[Row], rule: Rule) -> Array:
     """Probability of each row under a rule."""
-    own, rival, _, _ = _arrays(rows)
-    v = np.array([weights[name] for name in terms(rows[0]["evidence"])])
-    s = own @ v + intercept
-    margin = np.where(np.isnan(rival[:, 0]), NO_RIVAL, np.nan_to_num(rival) @ v + intercept - s)
-    return np.array([confidence({"support": a, "rival_margin": b}) for a, b in zip(s, margin, strict=True)])
+    told = [features(evidence) for evidence in _with_support(rows, rule.weights, rule.intercept)]
+    return np.array([believed(rule.trees(row), row["rival_margin"]) for row in told])
 
 
 def unseen(rows: list[Row], folds: int = 5) -> Array:
@@ -171,7 +205,7 @@ def unseen(rows: list[Row], folds: int = 5) -> Array:
     p = np.zeros(len(rows))
     for k in range(folds):
         rule = fit([row for row, f in zip(rows, its, strict=True) if f != k])
-        p[its == k] = predicted([row for row, f in zip(rows, its, strict=True) if f == k], *rule)
+        p[its == k] = predicted([row for row, f in zip(rows, its, strict=True) if f == k], rule)
     return p
 
 
@@ -196,7 +230,7 @@ def main() -> None:
     parser.add_argument("--rows", type=Path, default=Path("runs/evidence.jsonl"))
     parser.add_argument("--pairs", type=int, default=40, help="of each tier")
     parser.add_argument("--workers", type=int, default=2)
-    parser.add_argument("--write", type=Path, help="write the rule as JSON")
+    parser.add_argument("--write", type=Path, help="folder in which to write the rule as JSON")
     parser.add_argument("--picture", type=Path, help="draw the reliability curve of the five folds")
     options = parser.parse_args()
     if options.what == "gather":
@@ -207,11 +241,15 @@ def main() -> None:
     report(rows, p)
     if options.picture:
         draw(p, np.array([row["right"] for row in rows]), options.picture)
-    weights, intercept = fit(rows)
-    rule = {"weights": {k: round(w, 3) for k, w in weights.items()}, "intercept": round(intercept, 3)}
-    print(json.dumps(rule, indent=2))
+    rule = fit(rows)
+    support = {
+        "weights": {k: round(w, 3) for k, w in rule.weights.items()},
+        "intercept": round(rule.intercept, 3),
+    }
+    print(json.dumps(support, indent=2))
     if options.write:
-        options.write.write_text(json.dumps(rule, indent=2) + "\n")
+        (options.write / "support.json").write_text(json.dumps(support, indent=2) + "\n")
+        (options.write / "confidence.json").write_text(json.dumps(rule.stored_trees) + "\n")
 
 
 if __name__ == "__main__":

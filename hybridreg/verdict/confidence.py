@@ -1,32 +1,78 @@
 # SPDX-License-Identifier: MIT
 """From evidence to a probability that the pose is right.
 
-Either the pose is right, or its best rival is, or none: each by the odds that its own evidence gives it
-(`hybridreg.verdict.support`), none by odds of one. So two poses that explain the data alike share the probability,
-however well they explain it, and a pose without rivals keeps its own.
+Boosted trees on the pose's evidence, its support among it, and on how its best rival does beside it; see
+`benchmarks.verdict_weights`, which fits them. Whatever speaks for the pose can only raise the probability, whatever
+speaks against it, its best rival included, can only lower it.
 """
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
+from functools import lru_cache
+from importlib.resources import files
 from typing import Literal
 
 import numpy as np
 
+from hybridreg.verdict.boosted import Boosted
+
 Word = Literal["ok", "doubtful", "failed"]
 
 OK, FAILED = 0.95, 0.5
-# A rival explains the data nearly as well when it alone keeps the pose from "ok": log-odds.
+# A rival explains the data nearly as well when its support is less than the log-odds of "ok" below the pose's.
 NEARLY = float(np.log(OK / (1.0 - OK)))
 # The rival margin where there is no rival to compare with, and the farthest that one counts.
 NO_RIVAL = -20.0
+# What speaks for a pose (+1) or against it (-1) the more there is of it; nought may do either.
+SPEAKS = {
+    "agreement_least": 1,
+    "agreement_middle": 1,
+    "agreement_most": 1,
+    "looked_least": 0,
+    "looked_through": -1,
+    "looked_through_less": -1,
+    "looked_through_more": -1,
+    "weakest": 1,
+    "matched": 1,
+    "recipes": 1,
+    "visible_less": 0,
+    "visible_more": 0,
+    "fitness_visible_less": 1,
+    "fitness_visible_more": 1,
+    "support": 1,
+    "rival_margin": -1,
+}
+# Evidence of one cloud each, told as the less and the more of both: a pair turned round has the same confidence.
+_BOTH = ("looked_through", "visible", "fitness_visible")
 
 
 def confidence(evidence: Mapping[str, float]) -> float:
-    """Probability in (0, 1) that the pose is right, from its `support` and `rival_margin`."""
-    margin = max(evidence["rival_margin"], NO_RIVAL)
-    against = np.exp([-evidence["support"], margin]).sum()
-    return float(1.0 / (1.0 + against))
+    """Probability in (0, 1) that the pose with this evidence (`hybridreg.verdict.judgement.evidence_of`) is right."""
+    told = features(evidence)
+    return believed(trees()(told), told["rival_margin"])
+
+
+def believed(log_odds: float, rival_margin: float) -> float:
+    """Probability by the trees, yet no more than the pose's share between itself and its best rival: of two that
+    explain the data alike at most one is right."""
+    return float(1.0 / (1.0 + np.exp(max(-log_odds, rival_margin))))
+
+
+@lru_cache(maxsize=1)
+def trees() -> Boosted:
+    """The trees in `confidence.json`, which `python -m benchmarks.verdict_weights` writes."""
+    return Boosted.read(json.loads(files("hybridreg.verdict").joinpath("confidence.json").read_text()))
+
+
+def features(evidence: Mapping[str, float]) -> dict[str, float]:
+    """What the trees ask about, by the names in `SPEAKS`."""
+    told = {name: evidence[name] for name in SPEAKS if name in evidence}
+    for name in _BOTH:
+        sides = (evidence[f"{name}_source"], evidence[f"{name}_target"])
+        told |= {f"{name}_less": min(sides), f"{name}_more": max(sides)}
+    return {**told, "rival_margin": max(evidence["rival_margin"], NO_RIVAL)}
 
 
 def word(probability: float) -> Word:

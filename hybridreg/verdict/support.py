@@ -35,8 +35,8 @@ class Model(NamedTuple):
 
 @lru_cache(maxsize=1)
 def model() -> Model:
-    """The rule in `model.json`, which `python -m benchmarks.verdict_weights` writes."""
-    stored = json.loads(files("hybridreg.verdict").joinpath("model.json").read_text())
+    """The rule in `support.json`, which `python -m benchmarks.verdict_weights` writes."""
+    stored = json.loads(files("hybridreg.verdict").joinpath("support.json").read_text())
     return Model(stored["weights"], stored["intercept"])
 
 

@@ -121,7 +121,8 @@ def test_a_pose_that_several_entries_came_to_counts_as_many_recipes() -> None:
     apart = run(offers("one", TRUTH), offers("two", WRONG), enough=1.0)
     assert apart.recipes == 1
     doubt, belief = (weigh(sample_scene()[0], pose) for pose in (one, two))
-    assert belief.confidence > doubt.confidence
+    assert belief.evidence["support"] > doubt.evidence["support"]
+    assert belief.confidence >= doubt.confidence
     assert belief.evidence["recipes"] == 2.0
 
 
@@ -140,13 +141,13 @@ class Matches:
 
 def test_matches_that_agree_with_a_pose_speak_for_it() -> None:
     few, many = ({"match": Matches(right=n), **offers("one", TRUTH)} for n in (4, 32))
-    confidence = []
+    supports = []
     for entry, share in ((few, 0.1), (many, 0.8)):
         scene = sample_scene()[0]
         found = weigh(scene, run(entry, scene=scene))
         assert found.evidence["matched"] == share
-        confidence.append(found.confidence)
-    assert confidence[0] < confidence[1]
+        supports.append(found.evidence["support"])
+    assert supports[0] < supports[1]
 
 
 def test_a_result_has_the_matches_that_agree_with_it_best() -> None:

@@ -6,7 +6,20 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hybridreg.verdict.confidence import FAILED, NEARLY, NO_RIVAL, OK, confidence, word
+from benchmarks.boosting import boost, plain
+from hybridreg.verdict.boosted import Boosted
+from hybridreg.verdict.confidence import (
+    FAILED,
+    NEARLY,
+    NO_RIVAL,
+    OK,
+    SPEAKS,
+    believed,
+    confidence,
+    features,
+    trees,
+    word,
+)
 from hybridreg.verdict.support import beside, model, support, terms
 
 share = st.floats(0.0, 1.0)
@@ -23,10 +36,16 @@ EVIDENCE = {
 }
 own = st.fixed_dictionaries(EVIDENCE)
 log_odds = st.floats(-15.0, 15.0)
-
-
-def believed(pose: float, rival: float) -> float:
-    return confidence({"support": pose, "rival_margin": rival - pose})
+WHOLE = EVIDENCE | {
+    "looked_least": st.floats(0.0, 3000.0),
+    "visible_source": share,
+    "visible_target": share,
+    "fitness_visible_source": share,
+    "fitness_visible_target": share,
+    "support": log_odds,
+    "rival_margin": st.floats(NO_RIVAL, 10.0),
+}
+whole = st.fixed_dictionaries(WHOLE)
 
 
 @given(
@@ -67,24 +86,39 @@ def test_recipes_that_came_to_a_pose_and_matches_that_agree_add_to_its_support(
     assert beside(1, 0.0) == 0.0 < beside(2, 0.0) < beside(3, 0.0) < beside(3, 0.1) < beside(3, 0.2)
 
 
-@given(log_odds, log_odds, st.floats(0.0, 5.0))
-def test_a_better_pose_or_a_worse_rival_never_lowers_the_confidence(
-    pose: float, rival: float, step: float
+@given(whole, st.sampled_from([name for name in SPEAKS if name in WHOLE and SPEAKS[name]]), share)
+def test_what_speaks_for_a_pose_never_lowers_its_confidence_nor_does_the_contrary_raise_it(
+    evidence: dict[str, float], name: str, step: float
 ) -> None:
-    assert 0.0 < believed(pose, rival) <= believed(pose + step, rival) < 1.0
-    assert believed(pose, rival) <= believed(pose, rival - step)
+    better = {**evidence, name: evidence[name] + SPEAKS[name] * step}
+    assert 0.0 < confidence(evidence) <= confidence(better) < 1.0
 
 
-@given(log_odds)
-def test_two_poses_that_explain_the_data_alike_are_never_ok(pose: float) -> None:
-    assert believed(pose, pose) <= 0.5
-    assert word(believed(pose, pose - 0.8 * NEARLY)) != "ok"
+@given(whole)
+def test_two_poses_that_explain_the_data_alike_are_never_ok(evidence: dict[str, float]) -> None:
+    assert confidence({**evidence, "rival_margin": 0.0}) <= 0.5
+    assert word(confidence({**evidence, "rival_margin": -0.8 * NEARLY})) != "ok"
 
 
-@given(log_odds)
-def test_without_a_rival_the_confidence_is_that_of_the_support(pose: float) -> None:
-    alone = confidence({"support": pose, "rival_margin": NO_RIVAL})
-    assert alone == pytest.approx(1.0 / (1.0 + np.exp(-pose)), abs=1e-6)
+@given(log_odds, st.floats(NO_RIVAL, 10.0))
+def test_a_pose_is_no_likelier_than_against_its_rival_alone(log_odds: float, margin: float) -> None:
+    assert believed(log_odds, margin) <= 1.0 / (1.0 + np.exp(margin))
+    assert believed(log_odds, NO_RIVAL) == pytest.approx(1.0 / (1.0 + np.exp(-log_odds)), abs=1e-6)
+
+
+def test_the_trees_are_those_of_scikit_learn() -> None:
+    rng = np.random.default_rng(0)
+    X = rng.uniform(size=(300, len(SPEAKS)))
+    y = X[:, 0] - X[:, 4] + 0.3 * rng.normal(size=300) > 0
+    rows = [dict(zip(SPEAKS, x, strict=True)) for x in X.tolist()]
+    fitted = boost(rows, y, np.ones(300))
+    ours = Boosted.read(plain(fitted))
+    assert [ours(row) for row in rows[:50]] == pytest.approx(fitted.decision_function(X[:50]), abs=1e-3)
+    assert ours.depth > 1
+
+
+def test_the_stored_trees_ask_about_what_the_evidence_has() -> None:
+    assert trees().names == tuple(SPEAKS)
 
 
 @pytest.mark.parametrize(
@@ -95,11 +129,13 @@ def test_words(probability: float, expected: str) -> None:
     assert word(probability) == expected
 
 
-@given(own)
-def test_a_pair_turned_round_has_the_same_support(numbers: dict[str, float]) -> None:
+@given(whole)
+def test_a_pair_turned_round_has_the_same_support_and_confidence(evidence: dict[str, float]) -> None:
+    there = {"source": "target", "target": "source"}
+    ends = {name: name.rpartition("_") for name in evidence}
     round_about = {
-        **numbers,
-        "looked_through_source": numbers["looked_through_target"],
-        "looked_through_target": numbers["looked_through_source"],
+        f"{stem}_{there[end]}" if end in there else name: evidence[name]
+        for name, (stem, _, end) in ends.items()
     }
-    assert support(round_about) == support(numbers)
+    assert support(round_about) == support(evidence)
+    assert features(round_about) == features(evidence)
