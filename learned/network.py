@@ -202,11 +202,21 @@ class RegistrationNetwork(nn.Module):
         """
         similarity = self.compare_points(encoding, kept)
         superpoints = self.match_superpoints(encoding, kept, features, similarity)
-        matches = self.match_points(encoding, superpoints, similarity)
+        matches = self._believed(encoding, kept, self.match_points(encoding, superpoints, similarity))
         reach = self.config.matching.consistency
         if filtered and reach is not None:
             matches = matches.only(consistent(matches.target, matches.source, matches.weight, reach))
         return superpoints, matches
+
+    def _believed(self, encoding: Encoding, kept: tuple[Kept, Kept], matches: PointMatches) -> PointMatches:
+        # Without the share of the matches whose ends the mask believes least to lie in the overlap.
+        doubted = 0.0 if self.config.omp is None else self.config.omp.doubted
+        target, source = kept[0].probability, kept[1].probability
+        if doubted == 0.0 or len(matches) == 0 or target is None or source is None:
+            return matches
+        owners = (encoding.target.patches.owner, encoding.source.patches.owner)
+        both = target[owners[0][matches.target_index]] * source[owners[1][matches.source_index]]
+        return matches.only(both >= both.quantile(doubted))
 
     def compare_points(self, encoding: Encoding, kept: tuple[Kept, Kept]) -> PointSimilarity | None:
         """The fine points of the kept superpoints held against each other; None where that is not wanted."""

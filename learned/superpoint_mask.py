@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import torch
@@ -19,11 +19,13 @@ _MIN_NODES = 4
 
 @dataclass(frozen=True)
 class Kept:
-    """Superpoints of one cloud that stay, ascending, and which rung of the ladder chose them."""
+    """Superpoints of one cloud that stay, ascending, which rung of the ladder chose them, and the probability of
+    overlap that all superpoints have, where it is known."""
 
     index: Tensor  # (k,) int64
     fallback: Fallback = "none"
     capped: int = 0  # superpoints left out only because there were too many
+    probability: Tensor | None = None  # (n,)
 
 
 def keep_predicted(probability: Tensor, patches: Patches, config: OmpConfig) -> Kept:
@@ -52,7 +54,9 @@ def choose(patches: Patches, probability: Tensor | None, config: OmpConfig, limi
     if probability is None:
         sizes = torch.bincount(patches.owner, minlength=len(patches.mask))
         return cap(keep_all(patches), sizes, limit)
-    return cap(keep_predicted(probability, patches, config), probability, limit)
+    return replace(
+        cap(keep_predicted(probability, patches, config), probability, limit), probability=probability
+    )
 
 
 def cap(kept: Kept, priority: Tensor, limit: int) -> Kept:

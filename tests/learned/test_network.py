@@ -57,6 +57,30 @@ def test_mask_off_is_geotransformer_bit_for_bit(batch: Batch) -> None:
     assert same(run(plain, batch), run(masked, blind))
 
 
+def test_matches_whose_ends_the_mask_believes_least_are_left_out(batch: Batch) -> None:
+    torch.manual_seed(3)
+    config = named_config("nano", omp=True)
+    assert config.omp is not None
+    all_of_them = RegistrationNetwork(replace(config, omp=replace(config.omp, threshold=0.0)))
+    doubting = RegistrationNetwork(replace(config, omp=replace(config.omp, threshold=0.0, doubted=0.25)))
+    doubting.load_state_dict(all_of_them.state_dict())
+    whole, part = run(all_of_them, batch), run(doubting, batch)
+    assert 0 < len(part.matches) < len(whole.matches)
+    assert len(part.matches) == pytest.approx(0.75 * len(whole.matches), rel=0.1)
+
+    def belief(output: Output) -> torch.Tensor:
+        assert output.overlap is not None
+        encoding, matches = output.encoding, output.matches
+        target, source = torch.sigmoid(output.overlap.target), torch.sigmoid(output.overlap.source)
+        return (
+            target[encoding.target.patches.owner[matches.target_index]]
+            * source[encoding.source.patches.owner[matches.source_index]]
+        )
+
+    least = belief(part).min()
+    assert int((belief(whole) >= least).sum()) == len(part.matches)
+
+
 def test_gated_visual_attention_starts_as_geotransformer(batch: Batch) -> None:
     torch.manual_seed(4)
     plain = RegistrationNetwork(named_config("nano"))
