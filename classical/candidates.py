@@ -15,7 +15,7 @@ from hybridreg.classical.nothing import NoOverlap
 from hybridreg.matches import Correspondences, Pose
 from hybridreg.scene import Scene
 from hybridreg.stage import Stage
-from hybridreg.verdict import rivals, support, views, weigh
+from hybridreg.verdict import rivals, support, weigh
 from hybridreg.verdict.confidence import NEARLY, OK
 from hybridreg.verdict.rivals import Rival
 
@@ -100,7 +100,7 @@ class Candidates(Stage):
 
     def _refined(self, scene: Scene, settled: Rival) -> Rival:
         T = self.refine(scene, Pose(settled.T)).T
-        value = support.of(*views.views(scene), T, views.spacing(scene))
+        value = support.support(support.numbers(*support.seen(scene, T)))
         # Along a corridor a refinement may slide away; else it is nearer than what settled, whatever its support.
         return Rival(T, value) if value > settled.by_surfaces - _NOISE else settled
 

@@ -46,7 +46,7 @@ def measure(source: Array, target: cKDTree | Array, T: Array, max_distance: floa
     max_distance : float
         Metres; a neighbour must be nearer than this.
     """
-    tree = target if isinstance(target, cKDTree) else cKDTree(target, balanced_tree=False)
+    tree = target if isinstance(target, cKDTree) else cKDTree(target, leafsize=32, balanced_tree=False)
     distance, index = _nearest(tree, se3.apply(T, source), max_distance)
     hit = np.isfinite(distance)
     rows = np.flatnonzero(hit)

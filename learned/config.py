@@ -110,7 +110,9 @@ class OmpConfig:
     evidence: bool = False  # superpoints also know how alike and unique their points' partners are; ours
     min_kept: int = 32
     min_kept_share: float = 0.15
-    doubted: float = 0.0  # share of the point matches left out: those whose ends it believes least; ours, at inference
+    doubted: float = (
+        0.0  # share of the point matches left out: those whose ends it believes least; ours, at inference
+    )
 
     def __post_init__(self) -> None:
         limits.within(self, 1, _WIDEST, "dim", "heads", "pool")

@@ -11,8 +11,8 @@ Rows = NDArray[np.int64]
 
 # Fixed-point steps to the main axes; each about squares the error.
 _TURNS = 12
-# Normals from which the axes of a whole cloud are found.
-_SAMPLE = 2_000
+# Normals of a cloud from which the axes are found.
+_SAMPLE = 1_000
 
 
 def main_axes(*facing: Array) -> Array:
@@ -23,6 +23,7 @@ def main_axes(*facing: Array) -> Array:
     walls of a room). From there the sum of fourth powers of the normals' components is made as large as a rotation
     can, the fixed point that independent component analysis uses for kurtosis.
     """
+    facing = tuple(n[:: max(1, len(n) // _SAMPLE)] for n in facing)
     normals = np.concatenate(facing)
     weight = np.concatenate([np.full(len(n), 1.0 / len(n)) for n in facing])[:, None]
     axes = np.linalg.eigh((weight * normals).T @ normals)[1].T
@@ -48,7 +49,7 @@ def balanced(normals: Array, n: int) -> Rows:
     On a field nine points in ten lie on the ground, which says nothing of where along it two clouds meet; normal-space
     sampling (Rusinkiewicz and Levoy 2001) lets the few others speak.
     """
-    axis = faced(normals, main_axes(normals[:: max(1, len(normals) // _SAMPLE)]))
+    axis = faced(normals, main_axes(normals))
     rng = np.random.default_rng(0)
     groups = sorted((rng.permutation(np.flatnonzero(axis == k)) for k in range(3)), key=len)
     kept: list[Rows] = []

@@ -14,8 +14,8 @@ from hybridreg.fitness import Fitness, measure
 from hybridreg.matches import Correspondences, Pose
 from hybridreg.resources import n_workers
 from hybridreg.scene import Scene
-from hybridreg.verdict import information, matched, rivals, support, views
-from hybridreg.verdict.agreement import Agreement, OneWay, compare
+from hybridreg.verdict import matched, rivals, support, views
+from hybridreg.verdict.agreement import Agreement, OneWay
 from hybridreg.verdict.confidence import NEARLY, NO_RIVAL, Word, confidence, word
 from hybridreg.verdict.information import Information
 from hybridreg.verdict.rivals import Rival
@@ -120,10 +120,8 @@ def weigh(scene: Scene, pose: Pose) -> Weighed:
 
 
 def _weigh(scene: Scene, pose: Pose) -> Weighed:
-    source, target = views.views(scene)
-    spacing = views.spacing(scene)
-    agreement = compare(source, target, pose.T, spacing)
-    held = information.measure(agreement, target)
+    agreement, held = support.seen(scene, pose.T)
+    _, target = views.views(scene)
     found = rivals.find(scene, pose.T, agreement, held, pose.rivals) if pose.found else []
     evidence = evidence_of(agreement, held, found, target, pose.recipes, matched.share(scene, pose.T))
     return Weighed(

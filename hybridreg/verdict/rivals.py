@@ -25,7 +25,7 @@ _OFFERED, _SETTLED, _CLOSELY = 4, 6, 3
 _SLIDES = (-16.0, -8.0, 8.0, 16.0)
 # Nearer than this (spacings, degrees) a rival is the pose itself.
 _APART, _TURNED = 3.0, 5.0
-_QUICK, _CLOSE, _ROUGHLY = 5, 2, 3
+_QUICK, _CLOSE, _ROUGHLY = 10, 2, 3
 # Best of many starts that are looked at closely.
 _KEPT = 8
 

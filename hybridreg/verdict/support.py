@@ -12,7 +12,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from hybridreg.verdict import information
+from hybridreg.scene import Scene
+from hybridreg.verdict import information, views
 from hybridreg.verdict.agreement import Agreement, compare
 from hybridreg.verdict.information import Information
 from hybridreg.verdict.views import View
@@ -90,6 +91,17 @@ def numbers(
     for side, way in (("source", agreement.source), ("target", agreement.target)):
         found[f"looked_through_{side}"] = share(way.free, way.looked)
     return {name: float(value) for name, value in found.items()}
+
+
+def seen(scene: Scene, T_target_source: Array) -> tuple[Agreement, Information]:
+    """What all asked points say about a pose (4, 4), found once a run."""
+
+    def look() -> tuple[Agreement, Information]:
+        source, target = views.views(scene)
+        agreement = compare(source, target, T_target_source, views.spacing(scene))
+        return agreement, information.measure(agreement, target)
+
+    return scene.shared(("verdict", "seen", T_target_source.tobytes()), look)
 
 
 def share(part: Mask, whole: Mask) -> float:
