@@ -25,8 +25,12 @@ def settle(
 ) -> Array:
     """Pose (4, 4) near T at which the source's settling points lie best on the target's planes.
 
-    From poses up to 4 degrees and 2 m off on simulated validation pairs, a narrow search after a wide one or before it
-    came back to the true pose more often than two of one kind.
+    Parameters
+    ----------
+    every : int
+        So many-th of the settling points are used.
+    wide : bool
+        Look for partners from twice as far, and trust far ones more at first.
     """
     rows = source.settling[::every]
     for step in _WIDE if wide else _STEPS:

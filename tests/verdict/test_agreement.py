@@ -5,14 +5,11 @@ import dataclasses
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 from made_places import Made
 
 from hybridreg import se3
 from hybridreg.verdict import views
 from hybridreg.verdict.agreement import Agreement, compare
-from hybridreg.verdict.axes import main_axes
 
 SHIFT = se3.from_rt(np.eye(3), np.array([3.0, 0.0, 0.0]))
 
@@ -51,22 +48,6 @@ def test_evidence_is_the_same_seen_from_either_cloud(crossing: Made) -> None:
     assert np.array_equal(there.looked, back.looked)
     assert np.array_equal(there.agreed, back.agreed)
     assert there.looked_through == back.looked_through
-
-
-@given(st.integers(0, 2**32 - 1))
-def test_axes_lie_along_floor_and_walls_though_all_are_equally_common(seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    R = se3.random_rotation(rng)
-    normals = np.repeat(np.eye(3), 400, axis=0) + rng.normal(0.0, 0.05, (1200, 3))
-    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    axes = main_axes(normals[:600] @ R.T, normals[600:] @ R.T)
-    assert axes @ axes.T == pytest.approx(np.eye(3), abs=1e-9)
-    assert np.abs(axes @ R).max(axis=0) == pytest.approx(np.ones(3), abs=1e-3)
-
-
-def test_the_commonest_direction_comes_first() -> None:
-    normals = np.repeat(np.eye(3), [100, 700, 300], axis=0)
-    assert np.abs(main_axes(normals)).argmax(axis=1).tolist() == [1, 2, 0]
 
 
 def test_few_points_count_for_little() -> None:
