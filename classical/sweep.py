@@ -86,8 +86,8 @@ def sweep(
         for yaw, score in zip(batch, fft.irfft2(product, s=(n, n), workers=n_threads()), strict=True):
             sector = int(_SECTORS * yaw / (2.0 * np.pi))
             better = score > best[sector]
-            best[sector][better] = score[better]
-            at[sector][better] = yaw
+            np.copyto(best[sector], score, where=better)
+            np.copyto(at[sector], yaw, where=better)
     best[:, beyond] = -np.inf
     return _peaks(best, at, place, most, share)
 

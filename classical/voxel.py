@@ -50,11 +50,17 @@ class VoxelGrid(Stage):
     def __call__(self, pair: Pair) -> Scene:
         clouds = (pair.source, pair.target)
         voxel = self.voxel or default_voxel(pair.source, pair.target)
-        points = [voxel_centroids(cloud.points, voxel) for cloud in clouds]
         reached = voxel
+        points = [voxel_centroids(cloud.points, voxel) for cloud in clouds]
+        at = [voxel, voxel]
         while self.voxel is None and (most := max(map(len, points))) > _MOST_POINTS:
             voxel = _two_digits_up(voxel * (most / _MOST_POINTS) ** 0.5)
-            points = [voxel_centroids(cloud.points, voxel) for cloud in clouds]
+            for k, cloud in enumerate(clouds):
+                if len(points[k]) > _MOST_POINTS:
+                    points[k], at[k] = voxel_centroids(cloud.points, voxel), voxel
+        for k, cloud in enumerate(clouds):  # one of few points follows when the voxel is found
+            if at[k] != voxel:
+                points[k] = voxel_centroids(cloud.points, voxel)
         spacing = [voxel, voxel]
         if self.density == "match":
             dense = int(np.argmax([len(p) for p in points]))
