@@ -36,9 +36,13 @@ def read(path: str | os.PathLike[str]) -> Predictions:
 
     Raises
     ------
+    FileNotFoundError
+        No such file.
     ValueError
         No such file's content, or a broken line before the last.
     """
+    if not Path(path).is_file():
+        raise FileNotFoundError(f"{os.fspath(path)}: no file of predictions; run `hybridreg eval` to make one")
     lines, _ = _whole_lines(Path(path))
     if not lines:
         raise ValueError(f"{os.fspath(path)}: holds no predictions; run `hybridreg eval` to make some")

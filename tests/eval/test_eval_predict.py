@@ -191,3 +191,8 @@ def test_map_coordinates_do_not_blow_up_the_errors(tmp_path: Path) -> None:
         assert np.allclose(row.T_true, lower_pose(labelled.T_target_source, labelled.pair), atol=1e-6)
     moved = se3.inverse(np.array(rows[0].T_true)) @ np.array(rows[0].T)
     assert se3.angle_deg(moved[:3, :3]) < 1e-5
+
+
+def test_predictions_that_are_not_there_are_told_as_such(tmp_path: Path) -> None:
+    with pytest.raises(FileNotFoundError, match=r"row.jsonl: no file of predictions; run `hybridreg eval`"):
+        read(tmp_path / "row.jsonl")
