@@ -42,7 +42,9 @@ def read(path: str | os.PathLike[str]) -> Predictions:
         No such file's content, or a broken line before the last.
     """
     if not Path(path).is_file():
-        raise FileNotFoundError(f"{os.fspath(path)}: no file of predictions; run `hybridreg eval` to make one")
+        raise FileNotFoundError(
+            f"{os.fspath(path)}: no file of predictions; run `hybridreg eval` to make one"
+        )
     lines, _ = _whole_lines(Path(path))
     if not lines:
         raise ValueError(f"{os.fspath(path)}: holds no predictions; run `hybridreg eval` to make some")
