@@ -20,7 +20,8 @@ def bounds(points: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any]]:
 def radii(points: Array) -> Array:
     """Distances (N,) of `points` (N, 3) from the point of their medians, the shortest first, metres."""
     columns = np.ascontiguousarray(points.T)
-    columns -= np.median(columns, axis=1)[:, None]
+    # Not in place: of points that lie column by column these are the points themselves.
+    columns = columns - np.median(columns, axis=1)[:, None]
     return np.sort(np.sqrt(np.einsum("in,in->n", columns, columns)))
 
 
