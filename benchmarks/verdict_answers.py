@@ -11,7 +11,6 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -26,7 +25,7 @@ from hybridreg.matches import Correspondences, Pose
 from hybridreg.pair import Pair
 from hybridreg.scene import Scene
 from hybridreg.verdict import weigh
-from hybridreg.verdict.rivals import Rival
+from hybridreg.verdict.rivals import Rival, as_pose
 
 Array = NDArray[np.float64]
 Row = dict[str, Any]
@@ -58,7 +57,7 @@ def answers(scene: Scene, truth: Array | None, metres: float) -> Iterator[Row]:
     for found in candidates.stages(scene, Correspondences.none(), np.random.default_rng(0)):
         if found:
             stages.append(found)
-            if weigh(scene, _pose(found)).confidence >= candidates.enough:
+            if weigh(scene, as_pose(found)).confidence >= candidates.enough:
                 break
     looked_at = [stages[0], stages[-1]] if len(stages) > 1 else stages
     for found in looked_at:
@@ -71,13 +70,9 @@ def answers(scene: Scene, truth: Array | None, metres: float) -> Iterator[Row]:
 
 
 def _told(scene: Scene, found: list[Rival]) -> Row:
-    weighed = weigh(scene, _pose(found))
+    weighed = weigh(scene, as_pose(found))
     rival = [weigh(scene, Pose(one.T, found=False)).evidence for one in weighed.rivals[:1]]
     return {"evidence": weighed.evidence, "rival": rival}
-
-
-def _pose(found: list[Rival]) -> Pose:
-    return replace(Pose.ranked([one.T for one in found]), recipes=found[0].recipes)
 
 
 def _right(T: Array, truth: Array | None, metres: float) -> bool | None:

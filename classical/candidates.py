@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -70,11 +70,11 @@ class Candidates(Stage):
     def __call__(self, scene: Scene, matches: Correspondences, rng: np.random.Generator) -> Pose:
         found: list[Rival] = []
         for found in self.stages(scene, matches, rng):
-            if found and weigh(scene, _best_of(found)).confidence >= self.enough:
+            if found and weigh(scene, rivals.as_pose(found)).confidence >= self.enough:
                 break
         if not found:
             return Pose.unknown(len(matches))
-        return _best_of(found)
+        return rivals.as_pose(found)
 
     def stages(
         self, scene: Scene, matches: Correspondences, rng: np.random.Generator
@@ -103,10 +103,6 @@ class Candidates(Stage):
         value = support.support(support.numbers(*support.seen(scene, T)))
         # Along a corridor a refinement may slide away; else it is nearer than what settled, whatever its support.
         return Rival(T, value) if value > settled.by_surfaces - _NOISE else settled
-
-
-def _best_of(found: list[Rival]) -> Pose:
-    return replace(Pose.ranked([rival.T for rival in found]), recipes=found[0].recipes)
 
 
 def _built(entry: Entry) -> Entry:

@@ -24,11 +24,15 @@ def agreeing(scene: Scene, matches: Correspondences, T: Array) -> int:
 
 def share(scene: Scene, T: Array) -> float:
     """Agreeing share of the matches of that matcher of which most agree; 0 where none ran."""
-    return max((agreeing(scene, found, T) / len(found) for found in scene.matches), default=0.0)
+    return max((_share_of(scene, found, T) for found in scene.matches), default=0.0)
 
 
 def of_most(scene: Scene, T: Array) -> Correspondences:
     """Those matches of the run of which the largest share agrees with the pose; none where no matcher ran."""
     if not scene.matches:
         return Correspondences.none()
-    return max(scene.matches, key=lambda found: agreeing(scene, found, T) / len(found))
+    return max(scene.matches, key=lambda found: _share_of(scene, found, T))
+
+
+def _share_of(scene: Scene, found: Correspondences, T: Array) -> float:
+    return agreeing(scene, found, T) / len(found)

@@ -4,12 +4,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hybridreg import se3
+from hybridreg.matches import Pose
 from hybridreg.scene import Scene
 from hybridreg.verdict import matched, support, views
 from hybridreg.verdict.agreement import Agreement
@@ -43,6 +45,11 @@ class Rival(NamedTuple):
     def support(self) -> float:
         """Log-odds that the pose is right, were there no other."""
         return self.by_surfaces + support.beside(self.recipes, self.matched)
+
+
+def as_pose(found: Sequence[Rival]) -> Pose:
+    """The first of `found`, at least one, as a pose with the others as its rivals."""
+    return replace(Pose.ranked([one.T for one in found]), recipes=found[0].recipes)
 
 
 def best_first(scene: Scene, starts: Sequence[Array]) -> list[Rival]:
