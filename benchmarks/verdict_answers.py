@@ -3,7 +3,8 @@
 
 Every tier of `sim:train`, disjoint pairs too, and the worlds of the verdict's tests (rooms, corridors, yards, woods).
 An answer is the best pose after the first recipe and after the last that `default` runs; and, as if the right pose had
-not been found, the best wrong one. No real pair and no validation or test pair takes part.
+not been found, the best wrong one. The support learns from all poses that were found at last, and from the true one
+where none of them is right: which of these is it, if any? No real pair and no validation or test pair takes part.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ from hybridreg.eval import metrics
 from hybridreg.matches import Correspondences, Pose
 from hybridreg.pair import Pair
 from hybridreg.scene import Scene
-from hybridreg.verdict import weigh
+from hybridreg.verdict import matched, support, weigh
 from hybridreg.verdict.rivals import Rival, as_pose
 
 Array = NDArray[np.float64]
@@ -32,6 +33,8 @@ Row = dict[str, Any]
 TIERS = ("near", "mid", "far", "degenerate", "disjoint", "worlds")
 # Pairs of each tier before this one taught the shipped networks, which find more on them than on others.
 FIRST = 2000
+# Poses of a pair that are ranked beside one another, at most.
+_RANKED = 8
 # A wrong answer where the right one was found would seldom be given: so much it counts, beside a right one.
 AS_IF = 0.15
 
@@ -63,7 +66,8 @@ def answers(scene: Scene, truth: Array | None, metres: float) -> Iterator[Row]:
     for found in looked_at:
         right = [_right(one.T, truth, metres) for one in found]
         share = 1.0 / len(looked_at)
-        yield {**_told(scene, found), "right": right[0] is True, "weight": share}
+        ranked = _ranked(scene, found, truth, metres) if found is stages[-1] else None
+        yield {**_told(scene, found), "right": right[0] is True, "weight": share, "ranked": ranked}
         wrong = [one for one, well in zip(found, right, strict=True) if well is False]
         if right[0] and wrong:
             yield {**_told(scene, wrong), "right": False, "weight": share * AS_IF}
@@ -73,6 +77,18 @@ def _told(scene: Scene, found: list[Rival]) -> Row:
     weighed = weigh(scene, as_pose(found))
     rival = [weigh(scene, Pose(one.T, found=False)).evidence for one in weighed.rivals[:1]]
     return {"evidence": weighed.evidence, "rival": rival}
+
+
+def _ranked(scene: Scene, found: list[Rival], truth: Array | None, metres: float) -> Row:
+    # Evidence of the poses, and the rows of the right ones. What is nearly right is left out.
+    poses = [(one.T, one.recipes, _right(one.T, truth, metres)) for one in found[:_RANKED]]
+    poses = [pose for pose in poses if pose[2] is not None]
+    if truth is not None and not any(right for *_, right in poses):
+        poses.append((truth, 1, True))
+    evidence = [
+        support.numbers(*support.seen(scene, T), recipes, matched.share(scene, T)) for T, recipes, _ in poses
+    ]
+    return {"evidence": evidence, "right": [k for k, (*_, right) in enumerate(poses) if right]}
 
 
 def _right(T: Array, truth: Array | None, metres: float) -> bool | None:

@@ -4,8 +4,9 @@
     python -m benchmarks.verdict_weights gather --rows runs/evidence.jsonl --pairs 40
     python -m benchmarks.verdict_weights fit --rows runs/evidence.jsonl --write hybridreg/verdict
 
-`gather` writes one line for each answer (`benchmarks.verdict_answers`): its evidence, that of its best rival, and
-whether it is right. `fit` prints how the rules do on pairs that they were not fitted to (five-fold), and writes them.
+`gather` writes one line for each answer (`benchmarks.verdict_answers`): its evidence, that of its best rival, that of
+all poses that were found, and what is right. `fit` prints how the rules do on pairs that they were not fitted to
+(five-fold), and writes them.
 """
 
 from __future__ import annotations
@@ -33,40 +34,30 @@ RIDGE = 3e-4
 
 
 def fit_support(rows: list[Row]) -> tuple[dict[str, float], float]:
-    """Weights of the terms and intercept under which the rows are likeliest: either the pose is right, or its best
-    rival is, or neither, each by the odds that its own terms give it."""
+    """Weights of the terms and intercept under which it is likeliest that of all poses of a pair the right one is
+    right, or none where none is, each by the odds that its own terms give it."""
     from scipy.optimize import minimize
 
-    own, rival, right, weight = _arrays(rows)
-    middle, width = own.mean(axis=0), own.std(axis=0)
-
-    def score(X: Array, v: Array) -> Array:
-        return np.maximum((X - middle) / width @ v[:-1] + v[-1], -50.0)
+    names = list(terms(rows[0]["evidence"]))
+    pairs = [row["ranked"] for row in rows if row["ranked"] and row["ranked"]["evidence"]]
+    X = np.array([list(terms(evidence).values()) for pair in pairs for evidence in pair["evidence"]])
+    first = np.cumsum([0, *(len(pair["evidence"]) for pair in pairs)])[:-1]
+    right = np.concatenate([np.isin(np.arange(len(p["evidence"])), p["right"]) for p in pairs])
+    none = np.array([not pair["right"] for pair in pairs])
+    middle, width = X.mean(axis=0), X.std(axis=0)
+    Z = (X - middle) / width
 
     def loss(v: Array) -> float:
-        s = score(own, v)
-        r = np.where(np.isnan(rival[:, 0]), -50.0, score(np.nan_to_num(rival), v))
-        all_of_them = np.logaddexp(np.logaddexp(0.0, s), r)
-        nll = all_of_them - np.where(right, s, np.logaddexp(0.0, r))
-        return float(weight @ nll + RIDGE * weight.sum() * v[:-1] @ v[:-1])
+        s = np.maximum(Z @ v[:-1] + v[-1], -50.0)
+        of_all = np.logaddexp(0.0, np.logaddexp.reduceat(s, first))
+        of_right = np.where(none, 0.0, np.logaddexp.reduceat(np.where(right, s, -100.0), first))
+        return float(np.sum(of_all - of_right) + RIDGE * len(pairs) * v[:-1] @ v[:-1])
 
     # What speaks for a pose never speaks against it: the terms of looking through are the only objections.
-    sign = [
-        (None, 0.0) if name.startswith("looked_through") else (0.0, None)
-        for name in terms(rows[0]["evidence"])
-    ]
+    sign = [(None, 0.0) if "through" in name else (0.0, None) for name in names]
     v = minimize(loss, np.zeros(len(sign) + 1), method="L-BFGS-B", bounds=[*sign, (None, None)]).x
     weights = v[:-1] / width
-    return dict(zip(terms(rows[0]["evidence"]), weights.tolist(), strict=True)), float(
-        v[-1] - middle @ weights
-    )
-
-
-def _arrays(rows: list[Row]) -> tuple[Array, Array, NDArray[np.bool_], Array]:
-    own = np.array([list(terms(row["evidence"]).values()) for row in rows])
-    lacking = [np.nan] * own.shape[1]
-    rival = np.array([list(terms(row["rival"][0]).values()) if row["rival"] else lacking for row in rows])
-    return own, rival, np.array([row["right"] for row in rows]), np.array([row["weight"] for row in rows])
+    return dict(zip(names, weights.tolist(), strict=True)), float(v[-1] - middle @ weights)
 
 
 @dataclass(frozen=True)

@@ -34,9 +34,10 @@ _VOXEL, _ALONG_REACH = 0.5, 60.0
 _COARSE, _REACH = 3.0, 175.0
 # Degrees between yaws; the share of the best peak's score that a peak needs: along a corridor the walls outvote what
 # tells one place from another.
-_YAW_STEP_DEG, _SHARE = 4.0, 0.65
-# How far the spectra are levelled when the best pose is not plain.
-_WHITEN = (0.0, 0.75)
+_YAW_STEP_DEG, _SHARE = 4.0, 0.5
+# How far the spectra are levelled at first, so that the few things on a field are heard beside its walls or woods; and
+# when the best pose is not plain.
+_LEVELLED, _WHITEN = 0.5, (0.0, 0.75)
 # A plane that leans more than this may be the wall beside a sensor that sees little ground, degrees.
 _STEEP_DEG = 40.0
 
@@ -128,6 +129,7 @@ class BirdsEye(Stage):
             farthest=self.farthest * voxel,
             most=self.tries,
             share=_SHARE,
+            whiten=_LEVELLED,
         )
         found = climb(
             source, target, peaks, cell=voxel, step_deg=0.4 * _YAW_STEP_DEG, step=0.5 * _COARSE * voxel

@@ -16,6 +16,7 @@ from hybridreg.matches import Correspondences, Pose
 from hybridreg.scene import Scene
 from hybridreg.stage import Stage
 from hybridreg.verdict import rivals, support, weigh
+from hybridreg.verdict.climb import climb
 from hybridreg.verdict.confidence import NEARLY, OK
 from hybridreg.verdict.rivals import Rival
 
@@ -25,6 +26,8 @@ Entry = Mapping[str, Any]
 _SLOTS = ("overlap", "match", "estimate")
 # Poses looked at of each entry: its own and the best of its rivals; how many of these are refined at most.
 _LOOKED_AT, _REFINED = 8, 2
+# The best poses of all, which are looked around when no entry brought certainty.
+_CLIMBED = 4
 # Log-odds below which a settled pose is not refined, and by which its support may fall when it is.
 _HOPELESS, _NOISE = -3.0, 1.0
 
@@ -35,8 +38,8 @@ class Candidates(Stage):
 
     Every pose that an entry offers is settled and ranked by the verdict's own support (`hybridreg.verdict.support`),
     the best ones are refined, and the best of these is weighed with the others as its rivals. A pose to which
-    several entries came is believed the more. Later entries are not run once the confidence is `enough`. What was
-    not chosen comes back as `rivals`.
+    several entries came is believed the more. Later entries are not run once the confidence is `enough`; when none
+    brings it, better supported poses are looked for around the best ones. What was not chosen comes back as `rivals`.
 
     Parameters
     ----------
@@ -79,7 +82,7 @@ class Candidates(Stage):
     def stages(
         self, scene: Scene, matches: Correspondences, rng: np.random.Generator
     ) -> Iterator[list[Rival]]:
-        """What is found after each entry, the best supported first."""
+        """What is found after each entry, and after looking around at the end, the best supported first."""
         found: list[Rival] = []
         answers: list[list[Rival]] = []
         # A generator each, so that an entry's answer does not hang on those before it.
@@ -90,6 +93,9 @@ class Candidates(Stage):
                 answers.append(offered)
                 found = rivals.counted(scene, self._joined(scene, found, offered), answers)
             yield found
+        if found:
+            near = rivals.best_first(scene, [climb(scene, one.T) for one in found[:_CLIMBED]])
+            yield rivals.counted(scene, self._joined(scene, found, near), answers)
 
     def _joined(self, scene: Scene, found: list[Rival], offered: list[Rival]) -> list[Rival]:
         best = max(one.support for one in [*found, *offered])

@@ -25,7 +25,8 @@ _FINEST, _COARSEST = np.radians(0.5), np.radians(4.0)
 # would be 1 for a sharp-edged field of view with even rings; uneven rings and ragged edges add to it.
 _FILLED = 1.5
 _BITS = 12  # of a cell's index along one axis
-# Steeper than this a surface is seen edge-on, and how far a ray beside the point looks says nothing, degrees.
+# Steeper than this a surface is seen edge-on, degrees: a ray beside the point that goes on may graze the same surface
+# far behind it. Most ground is seen so.
 _EDGE_ON_DEG = 75.0
 # Two returns of one cell whose ranges differ by less than this share lie on one surface.
 _ONE_SURFACE = 0.1
@@ -98,7 +99,8 @@ class RangeImage:
             miss the surface, and tells nothing.
         k : int
             Nearest rays that are asked. One that stops at the point is enough for SEEN; all must go on behind it
-            for FREE, so that a ray beside a narrow thing does not deny it.
+            for FREE, so that a ray beside a narrow thing does not deny it. Of a surface that is seen edge-on none
+            tells FREE.
 
         Returns
         -------
@@ -113,10 +115,12 @@ class RangeImage:
         sideways = r[:, None] * angle
         asked = np.isfinite(angle) & (sideways <= reach)
         behind = self.ranges[np.minimum(index, len(self.ranges) - 1)] - r[:, None]
-        slack = margin + np.where(asked, sideways, 0.0) * _slope(ray / r[:, None], normals)[:, None]
+        slope, edge_on = _slope(ray / r[:, None], normals)
+        slack = margin + np.where(asked, sideways, 0.0) * slope[:, None]
         seen = (asked & (np.abs(behind) <= slack)).any(axis=1)
-        free = ~(asked & (behind <= slack)).any(axis=1)
-        state = np.where(seen, Seen.SEEN, np.where(free, Seen.FREE, Seen.HIDDEN))
+        through = ~(asked & (behind <= slack)).any(axis=1)
+        beyond = np.where(edge_on, Seen.UNSEEN, Seen.FREE)
+        state = np.where(seen, Seen.SEEN, np.where(through, beyond, Seen.HIDDEN))
         return np.where(asked.any(axis=1), state, Seen.UNSEEN).astype(np.int8)
 
 
@@ -161,10 +165,13 @@ def _thin(directions: Array, ranges: Array, angle: float) -> tuple[Array, Array]
     return directions[kept], ranges[kept]
 
 
-def _slope(rays: Array, normals: Array | None) -> Array:
-    # How much the range of a surface changes per metre sideways: the tangent of the angle of incidence.
+def _slope(rays: Array, normals: Array | None) -> tuple[Array, NDArray[np.bool_]]:
+    # How much the range of a surface changes per metre sideways: the tangent of the angle of incidence; and whether
+    # the surface is seen edge-on.
     if normals is None:
-        return np.ones(len(rays))
+        return np.ones(len(rays)), np.zeros(len(rays), dtype=bool)
     cosine = np.abs(np.einsum("ni,ni->n", rays, normals))
-    cosine = np.maximum(cosine, np.cos(np.radians(_EDGE_ON_DEG)))
-    return np.sqrt(np.maximum(1.0 - cosine**2, 0.0)) / cosine
+    least = np.cos(np.radians(_EDGE_ON_DEG))
+    edge_on = cosine < least
+    cosine = np.maximum(cosine, least)
+    return np.sqrt(np.maximum(1.0 - cosine**2, 0.0)) / cosine, edge_on

@@ -28,7 +28,7 @@ _COVERED, _ACROSS, _MARGIN, _REACH = 2.0, 0.5, 1.0, 1.0
 # Normals of one surface estimated twice, from different sensors' samples, seldom differ by more than 45 degrees.
 _SAME_NORMAL = float(np.cos(np.radians(45.0)))
 # Points looked at for nothing, added to every count: so few agreeing points are a coincidence.
-_FEW = 20.0
+FEW = 20.0
 # Without a range image a point counts as looked at where the other cloud has anything within so many spacings.
 _SURROUNDED = 6.0
 
@@ -75,12 +75,18 @@ class Agreement:
     @property
     def shares(self) -> Array:
         """Agreeing share (3,) of the points looked at, for each axis; few points count for little."""
-        return self.agreed / (self.looked + _FEW)
+        return self.agreed / (self.looked + FEW)
 
     @property
     def looked_through(self) -> float:
         """Share of the points looked at that a sensor looked through."""
-        return float(self.through.sum() / (self.looked.sum() + _FEW))
+        return float(self.through.sum() / (self.looked.sum() + FEW))
+
+    @property
+    def rare(self) -> tuple[float, float, float]:
+        """Points looked at, agreeing and looked through that do not face the commonest way: on a field, all but the
+        ground."""
+        return float(self.looked[1:].sum()), float(self.agreed[1:].sum()), float(self.through[1:].sum())
 
 
 def compare(source: View, target: View, T_target_source: Array, spacing: float, every: int = 1) -> Agreement:

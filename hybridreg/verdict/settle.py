@@ -13,8 +13,9 @@ from hybridreg.verdict.views import View
 Array = NDArray[np.float64]
 
 # Search distances of the steps, in spacings: wide enough to pull in a guess that is some cells off, then tight; and
-# for a guess that may be two or three metres off.
-_STEPS, _WIDE = (6.0, 4.0, 3.0, 2.0, 2.0), (12.0, 8.0, 5.0, 3.0, 2.0, 2.0)
+# for a guess that may be two or three metres off. On a field, where few surfaces pull, a quicker descent comes to rest
+# on the way.
+_STEPS, _WIDE = (6.0, 4.0, 3.0, 2.0, 2.0), (12.0, 10.0, 8.0, 6.0, 5.0, 4.0, 3.0, 2.0, 2.0)
 # Width of the weights where the search is wide, per search distance.
 _TRUST = 0.25
 _FEWEST = 30

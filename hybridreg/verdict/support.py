@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from hybridreg.scene import Scene
 from hybridreg.verdict import information, views
-from hybridreg.verdict.agreement import Agreement, compare
+from hybridreg.verdict.agreement import FEW, Agreement, compare
 from hybridreg.verdict.information import Information
 from hybridreg.verdict.views import View
 
@@ -61,6 +61,10 @@ def terms(evidence: Mapping[str, float]) -> dict[str, float]:
         "log_agreement_least": float(np.log(evidence["agreement_least"] + _NOTHING)),
         "looked_through": evidence["looked_through"],
         "looked_through_less": min(through),
+        "agreement_rare": evidence["agreement_rare"],
+        "looked_through_rare": evidence["looked_through_rare"],
+        "log_agreed_rare": float(np.log1p(evidence["agreed_rare"])),
+        "log_through_rare": float(np.log1p(evidence["through_rare"])),
         "log_weakest": float(np.log10(evidence["weakest"] + _UNHELD)),
         "log_recipes": float(np.log(evidence["recipes"])),
         "matched": evidence["matched"],
@@ -78,12 +82,17 @@ def numbers(
 ) -> dict[str, float]:
     """What tells of one pose by itself; see `hybridreg.verdict.judgement.evidence_of`."""
     least, middle, most = np.sort(agreement.shares)
+    looked, agreed, through = agreement.rare
     found = {
         "agreement_least": least,
         "agreement_middle": middle,
         "agreement_most": most,
         "looked_least": agreement.looked.min(),
         "looked_through": agreement.looked_through,
+        "agreement_rare": agreed / (looked + FEW),
+        "looked_through_rare": through / (looked + FEW),
+        "agreed_rare": agreed,
+        "through_rare": through,
         "weakest": held.weakest,
         "recipes": recipes,
         "matched": matched,

@@ -164,7 +164,7 @@ def test_a_result_has_the_matches_that_agree_with_it_best() -> None:
 def test_what_every_entry_found_can_be_followed() -> None:
     entries = (offers("one", WRONG), offers("nothing"), offers("two", TRUTH))
     stages = list(hr.Candidates(of=entries).stages(sample_scene()[0], NONE, np.random.default_rng(0)))
-    assert [len(found) for found in stages] == [1, 1, 2]
+    assert [len(found) for found in stages[:-1]] == [1, 1, 2]
     assert is_right(stages[-1][0].T)
     supports = [one.support for one in stages[-1]]
     assert supports == sorted(supports, reverse=True)

@@ -30,6 +30,10 @@ EVIDENCE = {
     "looked_through": share,
     "looked_through_source": share,
     "looked_through_target": share,
+    "agreement_rare": share,
+    "looked_through_rare": share,
+    "agreed_rare": st.floats(1.0, 3000.0),
+    "through_rare": st.floats(1.0, 3000.0),
     "weakest": st.floats(0.0, 1.0 / 3.0),
     "recipes": st.integers(1, 5),
     "matched": share,
@@ -56,7 +60,7 @@ whole = st.fixed_dictionaries(WHOLE)
 def test_more_agreement_and_fewer_objections_never_lower_the_support(
     numbers: dict[str, float], name: str, step: float
 ) -> None:
-    against = name.startswith("looked_through")
+    against = "through" in name
     better = {**numbers, name: numbers[name] + (-step if against else 1 if name == "recipes" else step)}
     assert support(better) >= support(numbers)
 
@@ -69,6 +73,10 @@ def test_the_rule_weighs_the_terms_and_nothing_else() -> None:
         "looked_through": 0.1,
         "looked_through_source": 0.2,
         "looked_through_target": 0.05,
+        "agreement_rare": 0.5,
+        "looked_through_rare": 0.1,
+        "agreed_rare": 40.0,
+        "through_rare": 8.0,
         "weakest": 0.02,
         "recipes": 1,
         "matched": 0.4,

@@ -108,6 +108,16 @@ def test_turning_cloud_and_question_together_changes_little(seed: int) -> None:
     assert same.mean() > 0.85
 
 
+def test_a_ray_that_grazes_the_ground_does_not_look_through_it() -> None:
+    # A ring on the ground at 20 m from 1.8 m up, and a place 3 m before it: the ray passes 27 cm above.
+    ring = [[20.0 * np.cos(a), 20.0 * np.sin(a), -1.8] for a in np.radians(np.arange(-5.0, 5.0, 0.1))]
+    image = RangeImage.of(np.array(ring), np.zeros(3))
+    place = np.array([[17.0, 0.0, -1.8]])
+    up, towards = np.array([[0.0, 0.0, 1.0]]), np.array([[-1.0, 0.0, 0.0]])
+    assert image.look(place, up, margin=0.05, reach=0.5)[0] == Seen.UNSEEN
+    assert image.look(place, towards, margin=0.05, reach=0.5)[0] == Seen.FREE
+
+
 def test_all_points_at_the_viewpoint_are_refused() -> None:
     with pytest.raises(ValueError, match="every point lies at the viewpoint"):
         RangeImage.of(np.zeros((30, 3)), np.zeros(3))

@@ -1,0 +1,61 @@
+# SPDX-License-Identifier: MIT
+"""The best supported pose near a pose, found by trying its neighbours.
+
+On a field the ground pulls everywhere and the few things that stand on it pull from near by only: surfaces settle half
+a metre or two beside the right pose, where the support has long begun to rise.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hybridreg import se3
+from hybridreg.scene import Scene
+from hybridreg.verdict import support, views
+from hybridreg.verdict.axes import main_axes
+
+Array = NDArray[np.float64]
+
+# First and last step along the commonest surface, in spacings.
+_FIRST, _LAST = 3.0, 0.3
+# A turn moves points at this quantile of the distances from the middle by so many steps.
+_ARM, _TURN = 0.7, 1.5
+# Neighbours: both shifts along the commonest surface and the turn about its normal.
+_NEIGHBOURS = np.array(
+    [(x, y, turn) for x in (-1, 0, 1) for y in (-1, 0, 1) for turn in (-1, 0, 1) if (x, y, turn) != (0, 0, 0)]
+)
+_EVERY = 3
+
+
+def climb(scene: Scene, T_target_source: Array) -> Array:
+    """Pose (4, 4) at the end of a pattern search for more support (Hooke and Jeeves 1961) from a pose (4, 4).
+
+    Only the three motions that leave the commonest surface (the ground) where it is are tried.
+    """
+    source, target = views.views(scene)
+    spacing = views.spacing(scene)
+    up = main_axes(target.normals)[0]
+    along = np.linalg.svd(up[None])[2][1:]  # (2, 3), orthogonal to it
+    middle = source.points.mean(axis=0)
+    arm = float(np.quantile(np.linalg.norm(source.points - middle, axis=1), _ARM)) or spacing
+
+    def seen(T: Array) -> float:
+        return support.of(source, target, T, spacing, _EVERY)
+
+    T, best, step = T_target_source, seen(T_target_source), _FIRST
+    while step >= _LAST:
+        around = [_moved(T, middle, m, step * spacing, along, up, arm) for m in _NEIGHBOURS]
+        values = [seen(one) for one in around]
+        highest = int(np.argmax(values))
+        if values[highest] > best:
+            T, best = around[highest], values[highest]
+        else:
+            step /= 2.0
+    return T
+
+
+def _moved(T: Array, middle: Array, motion: Array, step: float, along: Array, up: Array, arm: float) -> Array:
+    centre = se3.apply(T, middle[None])[0]
+    turn = se3.rotation_about(motion[2] * _TURN * step / arm * up)
+    return se3.from_rt(turn, centre - turn @ centre + step * motion[:2] @ along) @ T
