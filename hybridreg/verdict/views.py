@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Literal
 
@@ -13,6 +14,7 @@ from scipy.spatial import cKDTree
 from hybridreg import normals
 from hybridreg.range_image import RangeImage
 from hybridreg.resolution import default_voxel
+from hybridreg.resources import n_workers
 from hybridreg.scene import Level, Scene
 from hybridreg.verdict.axes import balanced
 
@@ -53,9 +55,7 @@ class View:
 
 def views(scene: Scene) -> tuple[View, View]:
     """Source and target of a scene, made once a run."""
-    return scene.shared(("verdict", "source"), lambda: _view(scene, "source")), scene.shared(
-        ("verdict", "target"), lambda: _view(scene, "target")
-    )
+    return scene.shared(("verdict", "views"), lambda: _both(scene))
 
 
 def spacing(scene: Scene) -> float:
@@ -63,9 +63,17 @@ def spacing(scene: Scene) -> float:
     return scene.shared(("verdict", "spacing"), lambda: default_voxel(scene.pair.source, scene.pair.target))
 
 
-def _view(scene: Scene, side: Side) -> View:
-    level: Level = getattr(scene, side)
+def _both(scene: Scene) -> tuple[View, View]:
     wanted = spacing(scene)
+    # Side by side: most of it is sorting and trees, which each take one thread.
+    with ThreadPoolExecutor(min(2, n_workers())) as pool:
+        source = pool.submit(_view, scene, "source", wanted)
+        target = pool.submit(_view, scene, "target", wanted)
+        return source.result(), target.result()
+
+
+def _view(scene: Scene, side: Side, wanted: float) -> View:
+    level: Level = getattr(scene, side)
     if len(level) <= _MOST_POINTS and 1 / _NEAR_ENOUGH < level.spacing / wanted < _NEAR_ENOUGH:
         points, tree, surface = level.points, normals.tree(scene, side), normals.of(scene, side)
     else:
