@@ -18,14 +18,15 @@ from hybridreg.verdict.axes import main_axes
 Array = NDArray[np.float64]
 
 # First and last step along the commonest surface, in spacings.
-_FIRST, _LAST = 3.0, 0.3
+_FIRST, _LAST = 3.0, 0.375
 # A turn moves points at this quantile of the distances from the middle by so many steps.
 _ARM, _TURN = 0.7, 1.5
 # Neighbours: both shifts along the commonest surface and the turn about its normal.
 _NEIGHBOURS = np.array(
     [(x, y, turn) for x in (-1, 0, 1) for y in (-1, 0, 1) for turn in (-1, 0, 1) if (x, y, turn) != (0, 0, 0)]
 )
-_EVERY = 3
+# So many-th of the asked points are looked at; rounds at most, as along a corridor the support may rise for ever.
+_EVERY, _ROUNDS = 3, 30
 
 
 def climb(scene: Scene, T_target_source: Array) -> Array:
@@ -44,14 +45,16 @@ def climb(scene: Scene, T_target_source: Array) -> Array:
         return support.of(source, target, T, spacing, _EVERY)
 
     T, best, step = T_target_source, seen(T_target_source), _FIRST
-    while step >= _LAST:
+    for _ in range(_ROUNDS):
         around = [_moved(T, middle, m, step * spacing, along, up, arm) for m in _NEIGHBOURS]
         values = [seen(one) for one in around]
         highest = int(np.argmax(values))
         if values[highest] > best:
             T, best = around[highest], values[highest]
-        else:
+        elif step > _LAST:
             step /= 2.0
+        else:
+            break
     return T
 
 
