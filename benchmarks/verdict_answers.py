@@ -84,7 +84,8 @@ def _ranked(scene: Scene, found: list[Rival], truth: Array | None, metres: float
     poses = [(one.T, one.recipes, _right(one.T, truth, metres)) for one in found[:_RANKED]]
     poses = [pose for pose in poses if pose[2] is not None]
     if truth is not None and not any(right for *_, right in poses):
-        poses.append((truth, 1, True))
+        # No recipe came to it, which must not speak against recipes that meet.
+        poses = [*((T, 1, right) for T, _, right in poses), (truth, 1, True)]
     evidence = [
         support.numbers(*support.seen(scene, T), recipes, matched.share(scene, T)) for T, recipes, _ in poses
     ]

@@ -39,7 +39,7 @@ def fit_support(rows: list[Row]) -> tuple[dict[str, float], float]:
     from scipy.optimize import minimize
 
     names = list(terms(rows[0]["evidence"]))
-    pairs = [row["ranked"] for row in rows if row["ranked"] and row["ranked"]["evidence"]]
+    pairs = [row["ranked"] for row in rows if row.get("ranked") and row["ranked"]["evidence"]]
     X = np.array([list(terms(evidence).values()) for pair in pairs for evidence in pair["evidence"]])
     first = np.cumsum([0, *(len(pair["evidence"]) for pair in pairs)])[:-1]
     right = np.concatenate([np.isin(np.arange(len(p["evidence"])), p["right"]) for p in pairs])
