@@ -35,9 +35,9 @@ _COARSE, _REACH = 3.0, 175.0
 # Degrees between yaws; the share of the best peak's score that a peak needs: along a corridor the walls outvote what
 # tells one place from another.
 _YAW_STEP_DEG, _SHARE = 4.0, 0.5
-# How far the spectra are levelled at first, so that the few things on a field are heard beside its walls or woods; and
-# when the best pose is not plain.
-_LEVELLED, _WHITEN = 0.5, (0.0, 0.75)
+# How far the spectra are levelled: at first by half, so that the few things on a field are heard beside a wall or a
+# wood, and not at all when no pose is plain then; and in the second look.
+_LEVELLED, _WHITEN = (0.5, 0.0), (0.0, 0.75)
 # A plane that leans more than this may be the wall beside a sensor that sees little ground, degrees.
 _STEEP_DEG = 40.0
 
@@ -104,10 +104,15 @@ class BirdsEye(Stage):
         if len(source.filled.layer) == 0 or len(target.filled.layer) == 0:
             return []
         T_target_level = se3.inverse(T_level_target)
-        planar = self._planar(source, target, voxel)
-        found = best_first(scene, [T_target_level @ M @ T_level_source for M in planar])
-        if not found or found[0].support >= NEARLY:
-            return found
+        found: list[Rival] = []
+        for levelled in _LEVELLED:
+            planar = self._planar(source, target, voxel, levelled)
+            found += best_first(scene, [T_target_level @ M @ T_level_source for M in planar])
+            found.sort(key=lambda rival: -rival.support)
+            if found and found[0].support >= NEARLY:
+                return found
+        if not found:
+            return []
         # Levelled by the best pose, both clouds lie truer than by their grounds.
         T_level_source = _centred(T_level_target @ found[0].T, _centre(own.source))
         again = self._slid(self._view(own, "source", T_level_source, voxel), target, voxel)
@@ -120,7 +125,7 @@ class BirdsEye(Stage):
         near = np.hypot(*points[:, :2].T) < _REACH * voxel
         return from_above(points[near], eye, tuple(voxel * edge for edge in self.layers), voxel)
 
-    def _planar(self, source: FromAbove, target: FromAbove, voxel: float) -> list[Array]:
+    def _planar(self, source: FromAbove, target: FromAbove, voxel: float, whiten: float) -> list[Array]:
         peaks = sweep(
             source,
             target,
@@ -129,7 +134,7 @@ class BirdsEye(Stage):
             farthest=self.farthest * voxel,
             most=self.tries,
             share=_SHARE,
-            whiten=_LEVELLED,
+            whiten=whiten,
         )
         found = climb(
             source, target, peaks, cell=voxel, step_deg=0.4 * _YAW_STEP_DEG, step=0.5 * _COARSE * voxel

@@ -27,7 +27,7 @@ _SLOTS = ("overlap", "match", "estimate")
 # Poses looked at of each entry: its own and the best of its rivals; how many of these are refined at most.
 _LOOKED_AT, _REFINED = 8, 2
 # The best poses of all, which are looked around when no entry brought certainty.
-_CLIMBED = 4
+_CLIMBED = 8
 # Log-odds below which a settled pose is not refined, and by which its support may fall when it is.
 _HOPELESS, _NOISE = -3.0, 1.0
 
@@ -94,7 +94,7 @@ class Candidates(Stage):
                 found = rivals.counted(scene, self._joined(scene, found, offered), answers)
             yield found
         if found:
-            near = rivals.best_first(scene, [climb(scene, one.T) for one in found[:_CLIMBED]])
+            near = rivals.distinct(scene, [climb(scene, one.T) for one in found[:_CLIMBED]])
             yield rivals.counted(scene, self._joined(scene, found, near), answers)
 
     def _joined(self, scene: Scene, found: list[Rival], offered: list[Rival]) -> list[Rival]:

@@ -14,6 +14,7 @@ from hybridreg import se3
 from hybridreg.scene import Scene
 from hybridreg.verdict import support, views
 from hybridreg.verdict.axes import main_axes
+from hybridreg.verdict.rivals import Rival
 
 Array = NDArray[np.float64]
 
@@ -29,10 +30,11 @@ _NEIGHBOURS = np.array(
 _EVERY, _ROUNDS = 3, 30
 
 
-def climb(scene: Scene, T_target_source: Array) -> Array:
-    """Pose (4, 4) at the end of a pattern search for more support (Hooke and Jeeves 1961) from a pose (4, 4).
+def climb(scene: Scene, T_target_source: Array) -> Rival:
+    """Where a pattern search for more support (Hooke and Jeeves 1961) ends that begins at a pose (4, 4).
 
-    Only the three motions that leave the commonest surface (the ground) where it is are tried.
+    Only the three motions that leave the commonest surface (the ground) where it is are tried. The pose is not settled
+    afterwards: surfaces might draw it back.
     """
     source, target = views.views(scene)
     spacing = views.spacing(scene)
@@ -55,7 +57,7 @@ def climb(scene: Scene, T_target_source: Array) -> Array:
             step /= 2.0
         else:
             break
-    return T
+    return Rival(T, support.of(source, target, T, spacing))
 
 
 def _moved(T: Array, middle: Array, motion: Array, step: float, along: Array, up: Array, arm: float) -> Array:

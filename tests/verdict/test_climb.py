@@ -38,7 +38,7 @@ def test_a_pose_beside_the_right_one_climbs_to_it(
 ) -> None:
     scene, truth = yard
     start = beside(truth, metres, turn_deg)
-    step = climb(scene, start) @ se3.inverse(truth)
+    step = climb(scene, start).T @ se3.inverse(truth)
     assert se3.angle_deg(step[:3, :3]) < 1.0
     assert np.linalg.norm(step[:3, 3]) < 0.35 < np.linalg.norm((start @ se3.inverse(truth))[:3, 3])
 
@@ -47,7 +47,7 @@ def test_support_never_falls_and_the_ground_stays_where_it_is(yard: tuple[Scene,
     scene, truth = yard
     source, target = views.views(scene)
     start = beside(truth, (2.0, -1.0), 15.0)
-    end = climb(scene, start)
+    end = climb(scene, start).T
     before, after = (support.of(source, target, T, views.spacing(scene), every=3) for T in (start, end))
     assert after >= before
     step = end @ se3.inverse(start)
