@@ -30,9 +30,7 @@ def beside(T: np.ndarray, metres: tuple[float, float], turn_deg: float) -> np.nd
     return se3.from_rt(np.eye(3), np.array([*metres, 0.0])) @ T @ se3.yaw(turn_deg)
 
 
-@pytest.mark.parametrize(
-    ("metres", "turn_deg"), [((1.0, 0.3), 0.0), ((-0.4, 0.9), 2.0), ((0.6, -0.6), -2.0)]
-)
+@pytest.mark.parametrize(("metres", "turn_deg"), [((1.0, 0.3), 0.0), ((-0.4, 0.9), 2.0), ((0.6, -0.6), -2.0)])
 def test_a_pose_beside_the_right_one_climbs_to_it(
     yard: tuple[Scene, np.ndarray], metres: tuple[float, float], turn_deg: float
 ) -> None:
