@@ -28,7 +28,8 @@ _SLOTS = ("overlap", "match", "estimate")
 _LOOKED_AT, _REFINED = 8, 2
 # The best poses of all, which are looked around when no entry brought certainty.
 _CLIMBED = 8
-# Log-odds below which a settled pose is not refined, and by which its support may fall when it is.
+# Log-odds below which a settled pose is neither refined nor looked around, and by which its support may fall when it is
+# refined.
 _HOPELESS, _NOISE = -3.0, 1.0
 
 
@@ -94,7 +95,10 @@ class Candidates(Stage):
                 found = rivals.counted(scene, self._joined(scene, found, offered), answers)
             yield found
         if found:
-            near = rivals.distinct(scene, [climb(scene, one.T) for one in found[:_CLIMBED]])
+            hopeful = [one for one in found[:_CLIMBED] if one.support > _HOPELESS]
+            near = rivals.distinct(scene, [climb(scene, one.T) for one in hopeful])
+            if not near:
+                return
             yield rivals.counted(scene, self._joined(scene, found, near), answers)
 
     def _joined(self, scene: Scene, found: list[Rival], offered: list[Rival]) -> list[Rival]:

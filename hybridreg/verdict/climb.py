@@ -27,7 +27,7 @@ _NEIGHBOURS = np.array(
     [(x, y, turn) for x in (-1, 0, 1) for y in (-1, 0, 1) for turn in (-1, 0, 1) if (x, y, turn) != (0, 0, 0)]
 )
 # So many-th of the asked points are looked at; rounds at most, as along a corridor the support may rise for ever.
-_EVERY, _ROUNDS = 3, 30
+_EVERY, _ROUNDS = 5, 30
 
 
 def climb(scene: Scene, T_target_source: Array) -> Rival:
