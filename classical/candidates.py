@@ -94,11 +94,9 @@ class Candidates(Stage):
                 answers.append(offered)
                 found = rivals.counted(scene, self._joined(scene, found, offered), answers)
             yield found
-        if found:
-            hopeful = [one for one in found[:_CLIMBED] if one.support > _HOPELESS]
+        hopeful = [one for one in found[:_CLIMBED] if one.support > _HOPELESS]
+        if hopeful:
             near = rivals.distinct(scene, [climb(scene, one.T) for one in hopeful])
-            if not near:
-                return
             yield rivals.counted(scene, self._joined(scene, found, near), answers)
 
     def _joined(self, scene: Scene, found: list[Rival], offered: list[Rival]) -> list[Rival]:
