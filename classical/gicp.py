@@ -4,28 +4,29 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from hybridreg import limits
+from hybridreg import limits, se3
 from hybridreg.classical.voxel import voxel_centroids
 from hybridreg.fitness import measure
 from hybridreg.matches import Pose
 from hybridreg.normals import tree
-from hybridreg.resources import n_workers
+from hybridreg.resources import n_threads, n_workers
 from hybridreg.scene import Scene
 from hybridreg.stage import Stage
 
 Array = NDArray[np.float64]
-Side = Literal["source", "target"]
 
 _FEWEST_NEIGHBOURS = 3  # span a plane
 # Steps at which a round ends, and how many times larger they may be in the rounds before the last.
 _STILL_RAD, _STILL_M, _COARSE = 1e-5, 1e-4, 100.0
 # Share of the points that lay on the target before and must do so after.
 _KEPT = 0.9
+# Points farther from the target than so many times the widest search are left out.
+_FAR = 2.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -58,10 +59,16 @@ class Gicp(Stage):
         import small_gicp
 
         voxel = self.voxel or 0.6 * scene.spacing
-        source, _ = _prepared(scene, "source", voxel, self.neighbours)
-        target, target_tree = _prepared(scene, "target", voxel, self.neighbours)
-        T = pose.T
         distances = self.max_distances or (5 * scene.spacing, 2.5 * scene.spacing, 1.25 * scene.spacing)
+        T = pose.T
+        near = _within(scene, T, voxel, _FAR * max(distances))
+        if len(near) < _FEWEST_NEIGHBOURS:
+            return pose
+        source, _ = _surfaces(near, self.neighbours)
+        target, target_tree = scene.shared(
+            ("small_gicp", voxel, self.neighbours),
+            lambda: _surfaces(voxel_centroids(scene.pair.target.points, voxel), self.neighbours),
+        )
         rests = False
         for distance in distances:
             last = distance == distances[-1]
@@ -100,17 +107,23 @@ def not_worse(scene: Scene, before: Pose, T: Array) -> Pose:
     return replace(before, T=T) if on[1] >= _KEPT * on[0] else before
 
 
-def _prepared(scene: Scene, side: Side, voxel: float, neighbours: int) -> tuple[Any, Any]:
-    return scene.shared(
-        ("small_gicp", side, voxel, neighbours),
-        lambda: _prepare(getattr(scene.pair, side).points, voxel, neighbours),
+def _within(scene: Scene, T: Array, voxel: float, reach: float) -> Array:
+    # The source's points (n, 3), less those that are no partners. small_gicp looks for the nearest point however far it
+    # is, and the farther it is the longer it takes: a third of the time for a right pose, half a minute for one that
+    # lays most points beside the target.
+    points: Array = scene.shared(
+        ("gicp source", voxel), lambda: voxel_centroids(scene.pair.source.points, voxel)
     )
+    distance, _ = tree(scene, "target").query(
+        se3.apply(T, points), distance_upper_bound=reach, workers=n_threads()
+    )
+    return points[np.isfinite(distance)]
 
 
-def _prepare(points: Array, voxel: float, neighbours: int) -> tuple[Any, Any]:
+def _surfaces(points: Array, neighbours: int) -> tuple[Any, Any]:
     import small_gicp
 
-    cloud = small_gicp.PointCloud(voxel_centroids(points, voxel))
+    cloud = small_gicp.PointCloud(points)
     kd_tree = small_gicp.KdTree(cloud, num_threads=n_workers())
     # Each point's covariance is its own sum, so here the number of threads changes nothing.
     small_gicp.estimate_covariances(cloud, kd_tree, min(neighbours, cloud.size()), n_workers())

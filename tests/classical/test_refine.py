@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import small_gicp
 
 import hybridreg as hr
 from hybridreg import se3
@@ -86,3 +87,35 @@ def test_a_refined_pose_remembers_how_it_was_found(
     found = stage(scene, Pose(truth, rivals=np.eye(4)[None], recipes=3))
     assert found.recipes == 3
     assert len(found.rivals) == 1
+
+
+def test_gicp_does_not_ask_for_partners_of_points_far_away(courtyard_scene: tuple[Scene, np.ndarray]) -> None:
+    scene, truth = courtyard_scene
+    rng = np.random.default_rng(0)
+    elsewhere = rng.uniform(-20.0, 20.0, (4_000, 3)) + [300.0, 0.0, 0.0]
+    longer = hr.VoxelGrid(voxel=scene.source.spacing)(
+        hr.Pair.of(np.concatenate([scene.pair.source.points, elsewhere]), scene.pair.target)
+    )
+    asked = _asked(longer, Pose(START @ truth))
+    assert 0 < max(asked) <= min(_asked(scene, Pose(START @ truth)))
+
+
+def test_gicp_leaves_a_pose_without_any_partner_as_it_is(courtyard_scene: tuple[Scene, np.ndarray]) -> None:
+    scene, _ = courtyard_scene
+    away = se3.from_rt(np.eye(3), np.array([500.0, 0.0, 0.0]))
+    assert _asked(scene, Pose(away)) == []
+    assert np.array_equal(hr.Gicp()(scene, Pose(away)).T, away)
+
+
+def _asked(scene: Scene, start: Pose) -> list[int]:
+    # Source points in each of small_gicp's rounds.
+    align, asked = small_gicp.align, []
+
+    def counted(target: Any, source: Any, *others: Any, **options: Any) -> Any:
+        asked.append(source.size())
+        return align(target, source, *others, **options)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(small_gicp, "align", counted)
+        hr.Gicp(voxel=0.3)(scene, start)
+    return asked
