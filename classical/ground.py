@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from typing import Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,9 +22,12 @@ _THICK, _OF_REACH, _SPACINGS = 0.25, 0.03, 0.6
 # Triples of points tried; how many look best on few points; how many of these are fitted on all.
 _TRIPLES, _LOOKED_AT, _FITTED = 4000, 120, 6
 _FEW, _MANY = 160, 1500
-# Least share of the cloud on the ground less what lies below it. A steep plane, or one far from the sensor, is a
-# wall more often than a ground. A sensor hangs more often upright than on its head.
-_LEAST, _STEEP_DEG, _FAR_METRES, _UPTURNED = 0.1, 40.0, 5.0, 0.9
+# Least share of the cloud on the ground less what lies below it.
+_LEAST = 0.1
+# A steep plane, or one far from the sensor, is a wall more often than a ground (in a lane the walls hold several times
+# the points). A sensor hangs more often upright than on its head.
+_STEEP_DEG, _STEEP = 40.0, 0.15
+_FAR_METRES, _FAR, _UPTURNED = 5.0, 0.5, 0.9
 
 
 class Ground(NamedTuple):
@@ -45,6 +48,13 @@ class Ground(NamedTuple):
         sine, cosine = float(np.linalg.norm(axis)), float(self.up @ z)
         direction = axis / sine if sine > 1e-9 else np.array([1.0, 0.0, 0.0])
         return se3.rotation_about(np.arctan2(sine, cosine) * direction)
+
+
+def on_grid(scene: Scene, voxel: float) -> Scene:
+    """The pair of a scene on the grid on which it is seen from above, made once a run."""
+    from hybridreg.classical.voxel import VoxelGrid
+
+    return scene.shared(("seen from above", voxel), lambda: VoxelGrid(voxel=voxel)(scene.pair))
 
 
 def find(scene: Scene, side: Literal["source", "target"]) -> Ground | None:
@@ -73,13 +83,13 @@ def _find(level: Level) -> Ground | None:
     found = [_fitted(points, weights, up, float(h), thick) for up, h in zip(ups, heights, strict=True)]
     if not found:
         return None
-    scores = _scores(
-        points, weights, np.array([g.up for g in found]), np.array([g.height for g in found]), thick
-    )
+    ups, heights = np.array([g.up for g in found]), np.array([g.height for g in found])
+    scores = _scores(points, weights, ups, heights, thick)
     best_one = int(np.argmax(scores))
-    if scores[best_one] < _LEAST:
-        return None
     up, height = found[best_one]
+    # Where no plane competes, a steep one needs no more points than another.
+    if scores[best_one] < _LEAST * (_STEEP if _steep(up) else 1.0):
+        return None
     return Ground(up, height + float(up @ viewpoint))
 
 
@@ -105,9 +115,14 @@ def _scores(points: Array, weights: Weights, ups: Array, heights: Array, thick: 
     above = (ups @ points.T - heights[:, None]) / thick  # (B, n)
     weights = weights / weights.sum()
     share = (np.abs(above) < 1.0) @ weights - (above < -2.0) @ weights
-    likely = np.where(np.abs(ups[:, 2]) < np.cos(np.radians(_STEEP_DEG)), 0.4, 1.0)
-    likely *= np.where(-heights > _FAR_METRES, 0.5, 1.0)
+    likely = np.where(_steep(ups), _STEEP, 1.0)
+    likely *= np.where(-heights > _FAR_METRES, _FAR, 1.0)
     return share * likely * np.where(ups[:, 2] < 0.0, _UPTURNED, 1.0)
+
+
+def _steep(up: Array) -> Any:
+    # Of one plane (3,) or of many (k, 3).
+    return np.abs(up[..., 2]) < np.cos(np.radians(_STEEP_DEG))
 
 
 def _fitted(points: Array, weights: Weights, up: Array, height: float, thick: float) -> Ground:
