@@ -53,8 +53,10 @@ def fit_support(rows: list[Row]) -> tuple[dict[str, float], float]:
         of_right = np.where(none, 0.0, np.logaddexp.reduceat(np.where(right, s, -100.0), first))
         return float(np.sum(of_all - of_right) + RIDGE * len(pairs) * v[:-1] @ v[:-1])
 
-    # What speaks for a pose never speaks against it: the terms of looking through are the only objections.
-    sign = [(None, 0.0) if "through" in name else (0.0, None) for name in names]
+    # What speaks for a pose never speaks against it. Objections are what was looked through, and common ground, where
+    # its likeness does not make up for it.
+    against = ["through" in name or name == "log_relief_cells" for name in names]
+    sign = [(None, 0.0) if speaks else (0.0, None) for speaks in against]
     v = minimize(loss, np.zeros(len(sign) + 1), method="L-BFGS-B", bounds=[*sign, (None, None)]).x
     weights = v[:-1] / width
     return dict(zip(names, weights.tolist(), strict=True)), float(v[-1] - middle @ weights)
@@ -141,7 +143,7 @@ def main() -> None:
         draw(p, np.array([row["right"] for row in rows]), options.picture)
     rule = fit(rows)
     support = {
-        "weights": {k: round(w, 3) for k, w in rule.weights.items()},
+        "weights": {k: float(f"{w:.4g}") for k, w in rule.weights.items()},
         "intercept": round(rule.intercept, 3),
     }
     print(json.dumps(support, indent=2))

@@ -17,9 +17,8 @@ from hybridreg.classical.climb import climb
 from hybridreg.classical.columns import FromAbove, from_above
 from hybridreg.classical.ground import Ground
 from hybridreg.classical.sweep import Planar, sweep
-from hybridreg.classical.voxel import VoxelGrid
-from hybridreg.extent import share_within
 from hybridreg.matches import Correspondences, Pose
+from hybridreg.resolution import map_cell
 from hybridreg.scene import Level, Scene
 from hybridreg.stage import Stage
 from hybridreg.verdict.confidence import NEARLY
@@ -28,8 +27,6 @@ from hybridreg.verdict.rivals import Rival, best_first, distinct
 Array = NDArray[np.float64]
 Side = Literal["source", "target"]
 
-# Outdoors; in a room, so many voxels along the distance within which all but a hundredth of the points lie.
-_VOXEL, _ALONG_REACH = 0.5, 60.0
 # In voxels: the coarse map's cell, how far from the sensor points are used. Two such clouds fit in the largest map.
 _COARSE, _REACH = 3.0, 175.0
 # Degrees between yaws; the share of the best peak's score that a peak needs: along a corridor the walls outvote what
@@ -38,6 +35,8 @@ _YAW_STEP_DEG, _SHARE = 4.0, 0.5
 # How far the spectra are levelled: at first by half, so that the few things on a field are heard beside a wall or a
 # wood, and not at all when no pose is plain then; and in the second look.
 _LEVELLED, _WHITEN = (0.5, 0.0), (0.0, 0.75)
+# Peaks looked at first, and the support beyond which the others are not looked at: twice the log-odds of "ok".
+_FIRST, _BEYOND_DOUBT = 10, 2.0 * NEARLY
 # A plane that leans more than this may be the wall beside a sensor that sees little ground, degrees.
 _STEEP_DEG = 40.0
 
@@ -84,8 +83,8 @@ class BirdsEye(Stage):
             raise ValueError(f"tries={self.tries} must be at least 1")
 
     def __call__(self, scene: Scene, matches: Correspondences, rng: np.random.Generator) -> Pose:
-        voxel = self.voxel or _default_voxel(scene)
-        own = VoxelGrid(voxel=voxel)(scene.pair)
+        voxel = self.voxel or map_cell(scene.pair.source, scene.pair.target)
+        own = ground.on_grid(scene, voxel)
         found: list[Rival] = []
         for frames in product(*_frames(own, scene)):
             laid = self._laid(scene, own, frames, voxel)
@@ -106,11 +105,14 @@ class BirdsEye(Stage):
         T_target_level = se3.inverse(T_level_target)
         found: list[Rival] = []
         for levelled in _LEVELLED:
-            planar = self._planar(source, target, voxel, levelled)
-            found += best_first(scene, [T_target_level @ M @ T_level_source for M in planar])
-            found.sort(key=lambda rival: -rival.support)
-            if found and found[0].support >= NEARLY:
-                return found
+            poses = [
+                T_target_level @ M @ T_level_source for M in self._planar(source, target, voxel, levelled)
+            ]
+            for some, plain in ((poses[:_FIRST], _BEYOND_DOUBT), (poses[_FIRST:], NEARLY)):
+                found += best_first(scene, some)
+                found.sort(key=lambda rival: -rival.support)
+                if found and found[0].support >= plain:
+                    return found
         if not found:
             return []
         # Levelled by the best pose, both clouds lie truer than by their grounds.
@@ -184,11 +186,6 @@ def _matrices(found: Planar) -> list[Array]:
         T[:2, 3] = shift.real, shift.imag
         poses.append(T)
     return poses
-
-
-def _default_voxel(scene: Scene) -> float:
-    reach = max(share_within(cloud.radii, 0.99) for cloud in (scene.pair.source, scene.pair.target))
-    return min(_VOXEL, float(f"{reach / _ALONG_REACH:.2g}")) or _VOXEL
 
 
 def _frames(own: Scene, scene: Scene) -> list[list[Array]]:

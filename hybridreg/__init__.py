@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from hybridreg.classical.kiss_icp import KissIcp
     from hybridreg.classical.nothing import GivenMatches, Identity, NoMatch, NoOverlap, NoRefinement
     from hybridreg.classical.ransac import Ransac
+    from hybridreg.classical.relief import ReliefSearch
     from hybridreg.classical.sampling import AllPoints, RandomSample
     from hybridreg.classical.svd import WeightedSvd
     from hybridreg.classical.visibility import Visibility
@@ -57,6 +58,7 @@ _WHERE = {
     "hybridreg.classical.kiss_icp": ["KissIcp"],
     "hybridreg.classical.nothing": ["GivenMatches", "Identity", "NoMatch", "NoOverlap", "NoRefinement"],
     "hybridreg.classical.ransac": ["Ransac"],
+    "hybridreg.classical.relief": ["ReliefSearch"],
     "hybridreg.classical.sampling": ["AllPoints", "RandomSample"],
     "hybridreg.classical.svd": ["WeightedSvd"],
     "hybridreg.classical.visibility": ["Visibility"],

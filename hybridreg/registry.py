@@ -32,6 +32,7 @@ BUILT_IN = {
     "estimate.fgr": "hybridreg.classical.fgr:Fgr",
     "estimate.kiss": "hybridreg.classical.kiss:KissMatcher",
     "estimate.birdseye": "hybridreg.classical.birdseye:BirdsEye",
+    "estimate.relief": "hybridreg.classical.relief:ReliefSearch",
     "estimate.candidates": "hybridreg.classical.candidates:Candidates",
     "estimate.lgr": "hybridreg.learned.stages.lgr:Lgr",
     "refine.none": "hybridreg.classical.nothing:NoRefinement",

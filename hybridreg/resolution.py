@@ -15,6 +15,9 @@ Array = NDArray[np.float64]
 _CELLS_ALONG_REACH = 60.0
 # Of the points, whose distance from the cloud's middle is its reach: stray returns lie anywhere.
 _MOST = 0.9
+# Cell of a map seen from above: metres outdoors; in a room, so many along the distance within which nearly all points
+# lie.
+_MAP_CELL, _CELLS_ALONG_MAP, _NEARLY_ALL = 0.5, 60.0, 0.99
 
 
 def default_voxel(source: PointCloud, target: PointCloud) -> float:
@@ -26,6 +29,12 @@ def default_voxel(source: PointCloud, target: PointCloud) -> float:
     # A cloud whose points lie nearly all in one place has no reach to speak of; its extent is the next best.
     length = shorter or max(_longest(cloud) for cloud in (source, target))
     return float(f"{length / _CELLS_ALONG_REACH:.2g}")
+
+
+def map_cell(source: PointCloud, target: PointCloud) -> float:
+    """Cell in which a pair is seen from above, metres: half a metre outdoors, less in rooms."""
+    longer = max(share_within(cloud.radii, _NEARLY_ALL) for cloud in (source, target))
+    return min(_MAP_CELL, float(f"{longer / _CELLS_ALONG_MAP:.2g}")) or _MAP_CELL
 
 
 def _longest(cloud: PointCloud) -> float:

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from hybridreg import se3
 from hybridreg.range_image import Seen
 from hybridreg.verdict.axes import faced, main_axes
+from hybridreg.verdict.relief import Alike, alike
 from hybridreg.verdict.views import View
 
 Array = NDArray[np.float64]
@@ -63,6 +64,8 @@ class Agreement:
     axes : (3, 3) float64, rows: main directions of the normals in the target's frame, the commonest first
     looked, agreed, through : (3,) float64, points that face each axis: looked at by the other sensor, agreeing, and
         looked through; both clouds together
+    relief : Alike
+        Whether the ground rises and falls alike.
     """
 
     source: OneWay
@@ -71,6 +74,7 @@ class Agreement:
     looked: Array
     agreed: Array
     through: Array
+    relief: Alike
 
     @property
     def shares(self) -> Array:
@@ -108,6 +112,7 @@ def compare(source: View, target: View, T_target_source: Array, spacing: float, 
         looked=every * looked,
         agreed=every * agreed,
         through=every * through,
+        relief=alike(source.relief, target.relief, T_target_source, every),
     )
 
 

@@ -38,6 +38,8 @@ SPEAKS = {
     "looked_through_rare": -1,
     "agreed_rare": 1,
     "through_rare": -1,
+    "relief_cells": 0,
+    "relief_correlation": 1,
     "weakest": 1,
     "matched": 1,
     "recipes": 1,

@@ -141,6 +141,8 @@ def evidence_of(
         together, and the points of one cloud
     agreement_rare, looked_through_rare : agreeing share, and share looked through, of the points that do not face the
         commonest way (on a field all but the ground); agreed_rare, through_rare : how many these are
+    relief_cells, relief_correlation : cells of ground that both clouds show, and how alike their small heights and
+        hollows are
     visible_source, visible_target : share of a cloud's points that the other sensor looked at
     hidden_source, hidden_target : share that stood behind something
     fitness_visible_source, fitness_visible_target : share of the visible points with a point near by

@@ -65,6 +65,14 @@ def best_first(scene: Scene, starts: Sequence[Array]) -> list[Rival]:
     return distinct(scene, found)[:_KEPT]
 
 
+def resting(scene: Scene, poses: Iterable[Array]) -> list[Rival]:
+    """Poses (4, 4) with their support where they are, not to be settled in this run."""
+    source, target = views.views(scene)
+    found = [Rival(T, support.of(source, target, T, views.spacing(scene))) for T in poses]
+    _known(scene).update((one.T.tobytes(), one) for one in found)
+    return found
+
+
 def _settled(scene: Scene, start: Array, every: int) -> Rival:
     source, target = views.views(scene)
     spacing = views.spacing(scene)

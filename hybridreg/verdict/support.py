@@ -16,6 +16,7 @@ from hybridreg.scene import Scene
 from hybridreg.verdict import information, views
 from hybridreg.verdict.agreement import FEW, Agreement, compare
 from hybridreg.verdict.information import Information
+from hybridreg.verdict.relief import nats
 from hybridreg.verdict.views import View
 
 Array = NDArray[np.float64]
@@ -25,6 +26,8 @@ Mask = NDArray[np.bool_]
 _UNHELD = 1e-4
 # A share below this is as good as none.
 _NOTHING = 0.02
+# Nats of the relief that are believed at most; beyond all doubt already.
+_TOLD = 1000.0
 
 
 class Model(NamedTuple):
@@ -53,6 +56,8 @@ def terms(evidence: Mapping[str, float]) -> dict[str, float]:
 
     No term tells source from target, so that a pair turned round has the same confidence.
     """
+    cells = evidence["relief_cells"]
+    relief = float(nats(cells, evidence["relief_correlation"]))
     through = [evidence[f"looked_through_{side}"] for side in ("source", "target")]
     return {
         "agreement_least": evidence["agreement_least"],
@@ -65,6 +70,8 @@ def terms(evidence: Mapping[str, float]) -> dict[str, float]:
         "looked_through_rare": evidence["looked_through_rare"],
         "log_agreed_rare": float(np.log1p(evidence["agreed_rare"])),
         "log_through_rare": float(np.log1p(evidence["through_rare"])),
+        "relief": float(np.clip(relief, -_TOLD, _TOLD)),
+        "log_relief_cells": float(np.log1p(cells)),
         "log_weakest": float(np.log10(evidence["weakest"] + _UNHELD)),
         "log_recipes": float(np.log(evidence["recipes"])),
         "matched": evidence["matched"],
@@ -93,6 +100,8 @@ def numbers(
         "looked_through_rare": through / (looked + FEW),
         "agreed_rare": agreed,
         "through_rare": through,
+        "relief_cells": agreement.relief.cells,
+        "relief_correlation": agreement.relief.correlation,
         "weakest": held.weakest,
         "recipes": recipes,
         "matched": matched,

@@ -12,11 +12,13 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from hybridreg import normals
+from hybridreg.classical import ground
 from hybridreg.range_image import RangeImage
-from hybridreg.resolution import default_voxel
+from hybridreg.resolution import default_voxel, map_cell
 from hybridreg.resources import n_workers
 from hybridreg.scene import Level, Scene
 from hybridreg.verdict.axes import balanced
+from hybridreg.verdict.relief import Relief
 
 Array = NDArray[np.float64]
 Side = Literal["source", "target"]
@@ -43,6 +45,8 @@ class View:
         Rows that are compared with the other cloud.
     settling : (k,) int64
         Rows by which a pose settles: surfaces that face each way equally often, in random order.
+    relief : Relief or None
+        Of the ground; None where the cloud shows none.
     """
 
     points: Array
@@ -51,6 +55,7 @@ class View:
     image: RangeImage | None
     asked: NDArray[np.int64]
     settling: NDArray[np.int64]
+    relief: Relief | None
 
 
 def views(scene: Scene) -> tuple[View, View]:
@@ -65,14 +70,15 @@ def spacing(scene: Scene) -> float:
 
 def _both(scene: Scene) -> tuple[View, View]:
     wanted = spacing(scene)
+    on_grid = ground.on_grid(scene, map_cell(scene.pair.source, scene.pair.target))
     # Side by side: most of it is sorting and trees, which each take one thread.
     with ThreadPoolExecutor(min(2, n_workers())) as pool:
-        source = pool.submit(_view, scene, "source", wanted)
-        target = pool.submit(_view, scene, "target", wanted)
+        source = pool.submit(_view, scene, "source", wanted, on_grid)
+        target = pool.submit(_view, scene, "target", wanted, on_grid)
         return source.result(), target.result()
 
 
-def _view(scene: Scene, side: Side, wanted: float) -> View:
+def _view(scene: Scene, side: Side, wanted: float, on_grid: Scene) -> View:
     level: Level = getattr(scene, side)
     if len(level) <= _MOST_POINTS and 1 / _NEAR_ENOUGH < level.spacing / wanted < _NEAR_ENOUGH:
         points, tree, surface = level.points, normals.tree(scene, side), normals.of(scene, side)
@@ -89,7 +95,15 @@ def _view(scene: Scene, side: Side, wanted: float) -> View:
         image=_image(scene, side),
         asked=asked,
         settling=balanced(surface, _N_ASKED),
+        relief=_relief(scene, side, on_grid),
     )
+
+
+def _relief(scene: Scene, side: Side, on_grid: Scene) -> Relief | None:
+    found, level = ground.find(on_grid, side), getattr(on_grid, side)
+    if found is None or level.viewpoint is None:
+        return None
+    return Relief.of(getattr(scene.pair, side).points, level.viewpoint, found, level.spacing)
 
 
 def _image(scene: Scene, side: Side) -> RangeImage | None:

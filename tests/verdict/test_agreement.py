@@ -10,6 +10,7 @@ from made_places import Made
 from hybridreg import se3
 from hybridreg.verdict import views
 from hybridreg.verdict.agreement import Agreement, compare
+from hybridreg.verdict.relief import Alike
 
 SHIFT = se3.from_rt(np.eye(3), np.array([3.0, 0.0, 0.0]))
 
@@ -58,6 +59,7 @@ def test_few_points_count_for_little() -> None:
         looked=np.array([1000.0, 100.0, 5.0]),
         agreed=np.array([900.0, 90.0, 5.0]),
         through=np.zeros(3),
+        relief=Alike(0.0, 0.0),
     )
     assert made.shares == pytest.approx([900 / 1020, 90 / 120, 5 / 25])
 
