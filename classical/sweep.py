@@ -50,7 +50,8 @@ def sweep(
     cell : float
         Edge of a map's cell, metres.
     yaws : (k,)
-        Radians, rising from 0 to below 2 pi.
+        Radians, rising from 0 to below pi. Each is tried with the half turn beyond it, whose spectra are the conjugate
+        ones.
     farthest : float
         Largest shift, metres.
     most : int
@@ -82,8 +83,9 @@ def sweep(
     at = np.zeros((_SECTORS, n, n))
     for batch in np.array_split(yaws, -(-len(yaws) // _BATCH)):
         turned = np.stack([signed(source, np.exp(1j * yaw), n, cell) for yaw in batch])
-        product = _product(fft.rfft2(turned, workers=n_threads()), spectrum, whiten)
-        for yaw, score in zip(batch, fft.irfft2(product, s=(n, n), workers=n_threads()), strict=True):
+        product = _products(fft.rfft2(turned, workers=n_threads()), spectrum, whiten)
+        both = np.concatenate([batch, batch + np.pi])
+        for yaw, score in zip(both, fft.irfft2(product, s=(n, n), workers=n_threads()), strict=True):
             sector = int(_SECTORS * yaw / (2.0 * np.pi))
             better = score > best[sector]
             np.copyto(best[sector], score, where=better)
@@ -92,13 +94,18 @@ def sweep(
     return _peaks(best, at, place, most, share)
 
 
-def _product(source: Complexes, target: Complexes, whiten: float) -> Complexes:
-    # Of spectra (yaws, layers, n, m) and (layers, n, m), summed over the layers.
-    product: Complexes = (np.conj(source) * target).sum(axis=1)
-    if whiten == 0.0:
-        return product
-    loud = np.sqrt((np.abs(source) ** 2).sum(axis=1) * (np.abs(target) ** 2).sum(axis=0))
-    return product / np.maximum(loud, _QUIET * loud.mean(axis=(1, 2), keepdims=True)) ** whiten
+def _products(source: Complexes, target: Complexes, whiten: float) -> Complexes:
+    # Of spectra (yaws, layers, n, m) and (layers, n, m), summed over the layers: of the source as it is, then turned by
+    # half a turn, which brings cell k to cell -k - 1.
+    n, m = target.shape[1:]
+    u, v = np.fft.fftfreq(n).astype(np.float32)[:, None], np.arange(m, dtype=np.float32) / n
+    as_it_is = (np.conj(source) * target).sum(axis=1)
+    half_turned = (source * target).sum(axis=1) * np.exp(np.complex64(-2j * np.pi) * (u + v))
+    products: Complexes = np.stack([as_it_is, half_turned])
+    if whiten > 0.0:
+        loud = np.sqrt((np.abs(source) ** 2).sum(axis=1) * (np.abs(target) ** 2).sum(axis=0))
+        products /= np.maximum(loud, _QUIET * loud.mean(axis=(1, 2), keepdims=True)) ** whiten
+    return products.reshape(-1, n, m)
 
 
 def _extent(view: FromAbove) -> float:

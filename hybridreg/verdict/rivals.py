@@ -28,8 +28,9 @@ _SLIDES = (-16.0, -8.0, 8.0, 16.0)
 # Nearer than this (spacings, degrees) a rival is the pose itself.
 _APART, _TURNED = 3.0, 5.0
 _QUICK, _CLOSE, _ROUGHLY = 10, 2, 3
-# Best of many starts that are looked at closely.
-_KEPT = 8
+# Best of many starts that are looked at closely, and how far the support of one may lie below the best: a closer look
+# raises it by less.
+_KEPT, _LEFT = 8, 12.0
 
 
 class Rival(NamedTuple):
@@ -60,7 +61,8 @@ def best_first(scene: Scene, starts: Sequence[Array]) -> list[Rival]:
     known = _known(scene)
     resting = [known[one.tobytes()] for one in starts if one.tobytes() in known]
     quickly = [_settled(scene, one, _ROUGHLY) for one in starts if one.tobytes() not in known]
-    found = [*resting, *(_settled(scene, one.T, 1) for one in distinct(scene, quickly)[:_KEPT])]
+    apart = distinct(scene, quickly)[:_KEPT]
+    found = [*resting, *(_settled(scene, one.T, 1) for one in apart if one.support > apart[0].support - _LEFT)]
     known.update((one.T.tobytes(), one) for one in found)
     return distinct(scene, found)[:_KEPT]
 

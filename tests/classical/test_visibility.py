@@ -101,6 +101,33 @@ def test_ground_is_found_under_a_sensor_on_its_head() -> None:
     assert found.above(np.zeros((1, 3)))[0] == pytest.approx(HEIGHT, abs=0.1)
 
 
+def lane() -> Array:
+    """A strip of ground between a high wall and a low one, the sensor near the high one: that holds most points."""
+    rng = np.random.default_rng(0)
+    along = rng.uniform(-15.0, 15.0, 12_000)
+    ground_, high, low = np.split(along, [500, 9_000])
+    return np.concatenate(
+        [
+            np.column_stack([ground_, rng.uniform(-1.0, 4.0, len(ground_)), np.full(len(ground_), -HEIGHT)]),
+            np.column_stack([high, np.full(len(high), -1.0), rng.uniform(-HEIGHT, 6.0, len(high))]),
+            np.column_stack([low, np.full(len(low), 4.0), rng.uniform(-HEIGHT, 1.0, len(low))]),
+        ]
+    )
+
+
+def test_a_wall_is_not_taken_for_the_ground_though_it_holds_more_points() -> None:
+    found = ground.find(scene_of(lane(), lane()), "source")
+    assert found is not None
+    assert found.up == pytest.approx([0.0, 0.0, 1.0], abs=0.05)
+
+
+def test_where_no_plane_is_level_a_steep_one_is_the_ground() -> None:
+    R = se3.rotation_about(np.array([np.radians(70.0), 0.0, 0.0]))
+    found = ground.find(scene_of(CIRCLE @ R.T, CIRCLE), "source")
+    assert found is not None
+    assert found.up == pytest.approx(R[:, 2], abs=0.05)
+
+
 def test_no_ground_no_vertical_but_still_a_range() -> None:
     directions = np.random.default_rng(0).normal(size=(6000, 3))
     ball = directions / np.linalg.norm(directions, axis=1, keepdims=True)
