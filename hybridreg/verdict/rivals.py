@@ -28,8 +28,8 @@ _SLIDES = (-16.0, -8.0, 8.0, 16.0)
 # Nearer than this (spacings, degrees) a rival is the pose itself.
 _APART, _TURNED = 3.0, 5.0
 _QUICK, _CLOSE, _ROUGHLY = 10, 2, 3
-# Best of many starts that are looked at closely, and how far the support of one may lie below the best: a closer look
-# raises it by less.
+# Best of many starts that are looked at closely, and how far the support of one may lie below the best (of 112 that lay
+# lower on 32 pairs of `sim:val`, none came out the best).
 _KEPT, _LEFT = 8, 12.0
 
 
