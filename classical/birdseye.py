@@ -37,8 +37,8 @@ _YAW_STEP_DEG, _SHARE = 4.0, 0.5
 _LEVELLED, _WHITEN = (0.5, 0.0), (0.0, 0.75)
 # Peaks looked at first, and the support beyond which the others are not looked at: twice the log-odds of "ok".
 _FIRST, _BEYOND_DOUBT = 10, 2.0 * NEARLY
-# A plane that leans more than this may be the wall beside a sensor that sees little ground, degrees.
-_STEEP_DEG = 40.0
+# Degrees: a sensor whose ground leans so much hangs on its head; from this lean on the plane may be askew, or a wall.
+_UPTURNED_DEG, _LEANS_DEG = 140.0, 10.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -52,8 +52,8 @@ class BirdsEye(Stage):
     support. The height follows from the two ground planes. The others come back as `rivals`.
 
     Where a cloud shows no ground, its sensor is taken to stand upright (or on its head, if the other one does) and
-    its lowest points to be the ground; a note says so. Where the ground that it shows is so steep that it may be a
-    wall, the vertical that the sensor's frame has is tried too, unless the ground's pose is plain.
+    its lowest points to be the ground; a note says so. Where the ground that it shows leans, it may be a wall or
+    askew: the vertical that the sensor's frame has is tried too, unless the ground's pose is plain.
 
     Parameters
     ----------
@@ -194,7 +194,7 @@ def _frames(own: Scene, scene: Scene) -> list[list[Array]]:
     frames = []
     for side, other in zip(_SIDES, reversed(_SIDES), strict=True):
         shown, known = found[side], found[other]
-        head_down = known is not None and known.up[2] < -np.cos(np.radians(_STEEP_DEG))
+        head_down = known is not None and known.up[2] < np.cos(np.radians(_UPTURNED_DEG))
         level = getattr(own, side)
         assumed = _level_frame(_assumed(level.points, -1.0 if head_down else 1.0), level)
         if shown is None:
@@ -204,8 +204,8 @@ def _frames(own: Scene, scene: Scene) -> list[list[Array]]:
             )
             frames.append([assumed])
         else:
-            steep = abs(shown.up[2]) < np.cos(np.radians(_STEEP_DEG))
-            frames.append([_level_frame(shown, level), assumed] if steep else [_level_frame(shown, level)])
+            leans = abs(shown.up[2]) < np.cos(np.radians(_LEANS_DEG))
+            frames.append([_level_frame(shown, level), assumed] if leans else [_level_frame(shown, level)])
     return frames
 
 

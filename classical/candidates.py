@@ -31,6 +31,8 @@ _CLIMBED = 8
 # Log-odds below which a settled pose is neither refined nor looked around, and by which its support may fall when it is
 # refined.
 _HOPELESS, _NOISE = -3.0, 1.0
+# Least information per point along a direction that surfaces hold by themselves.
+_WEAK = 0.01
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -92,12 +94,12 @@ class Candidates(Stage):
             if pose.found and np.isfinite(pose.T).all():
                 offered = rivals.best_first(scene, [pose.T, *pose.rivals[: _LOOKED_AT - 1]])
                 answers.append(offered)
-                found = rivals.counted(scene, self._joined(scene, found, offered), answers)
+                found = _polished(scene, rivals.counted(scene, self._joined(scene, found, offered), answers))
             yield found
         hopeful = [one for one in found[:_CLIMBED] if one.support > _HOPELESS]
         if hopeful:
             near = rivals.distinct(scene, [climb(scene, one.T) for one in hopeful])
-            yield rivals.counted(scene, self._joined(scene, found, near), answers)
+            yield _polished(scene, rivals.counted(scene, self._joined(scene, found, near), answers))
 
     def _joined(self, scene: Scene, found: list[Rival], offered: list[Rival]) -> list[Rival]:
         best = max(one.support for one in [*found, *offered])
@@ -111,6 +113,18 @@ class Candidates(Stage):
         value = support.support(support.numbers(*support.seen(scene, T)))
         # Along a corridor a refinement may slide away; else it is nearer than what settled, whatever its support.
         return Rival(T, value) if value > settled.by_surfaces - _NOISE else settled
+
+
+def _polished(scene: Scene, found: list[Rival]) -> list[Rival]:
+    # Along a direction that surfaces hardly hold, a refinement follows their noise; what else speaks holds it better.
+    first, *others = found
+    if first.support <= _HOPELESS or support.seen(scene, first.T)[1].weakest >= _WEAK:
+        return found
+    climbed = scene.shared(("polished", first.T.tobytes()), lambda: climb(scene, first.T, closely=True))
+    if climbed.by_surfaces < first.by_surfaces + _NOISE:
+        return found
+    scene.shared(("polished", climbed.T.tobytes()), lambda: climbed)
+    return [first._replace(T=climbed.T, by_surfaces=climbed.by_surfaces), *others]
 
 
 def _built(entry: Entry) -> Entry:

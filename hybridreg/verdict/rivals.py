@@ -28,8 +28,8 @@ _SLIDES = (-16.0, -8.0, 8.0, 16.0)
 # Nearer than this (spacings, degrees) a rival is the pose itself.
 _APART, _TURNED = 3.0, 5.0
 _QUICK, _CLOSE, _ROUGHLY = 10, 2, 3
-# Best of many starts that are looked at closely, and how far the support of one may lie below the best (of 112 that lay
-# lower on 32 pairs of `sim:val`, none came out the best).
+# Best of many starts that are looked at closely, unless the support of one lies so far below the best: of 112 that did
+# on 32 pairs of `sim:val`, none came out the best.
 _KEPT, _LEFT = 8, 12.0
 
 
@@ -62,7 +62,8 @@ def best_first(scene: Scene, starts: Sequence[Array]) -> list[Rival]:
     resting = [known[one.tobytes()] for one in starts if one.tobytes() in known]
     quickly = [_settled(scene, one, _ROUGHLY) for one in starts if one.tobytes() not in known]
     apart = distinct(scene, quickly)[:_KEPT]
-    found = [*resting, *(_settled(scene, one.T, 1) for one in apart if one.support > apart[0].support - _LEFT)]
+    closely = [_settled(scene, one.T, 1) if one.support > apart[0].support - _LEFT else one for one in apart]
+    found = [*resting, *closely]
     known.update((one.T.tobytes(), one) for one in found)
     return distinct(scene, found)[:_KEPT]
 
