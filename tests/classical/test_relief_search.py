@@ -63,3 +63,29 @@ def test_it_is_a_proper_stage() -> None:
 def test_bad_fields_are_refused(fields: dict[str, float]) -> None:
     with pytest.raises(ValueError, match="must be"):
         hr.ReliefSearch(**fields)
+
+
+def test_a_pose_beside_the_right_one_is_moved_back_along_bare_ground() -> None:
+    pair, truth = field_pair()
+    beside = se3.from_rt(np.eye(3), np.array([0.5, -0.3, 0.0])) @ truth
+    laid = hr.Pair.of(se3.apply(beside, pair.source.points), pair.target)
+    stage = hr.Candidates(of=({"estimate": "identity"},), refine="none")
+    found = stage(hr.VoxelGrid()(laid), Correspondences.none(), np.random.default_rng(0))
+    degrees, metres = wrong_by(found.T @ beside, truth)
+    assert degrees < 0.7
+    assert metres < 0.25
+
+
+def test_the_default_recipe_finds_a_bare_field_and_is_sure_of_it() -> None:
+    pair, truth = field_pair()
+    result = hr.register(pair.source, pair.target)
+    degrees, metres = wrong_by(result.transformation, truth)
+    assert degrees < 0.7
+    assert metres < 0.3
+    assert result.verdict == "ok"
+    assert result.evidence["relief_correlation"] > 0.6
+
+
+def test_the_default_recipe_is_not_sure_of_a_plane() -> None:
+    pair, _ = field_pair(bumps=0.0)
+    assert hr.register(pair.source, pair.target).verdict != "ok"
