@@ -71,9 +71,15 @@ def _unknown(images: tuple[str, ...]) -> Iterator[str]:
 
 
 def _in_favour(evidence: Mapping[str, float]) -> str:
+    cells = int(evidence["relief_cells"])
+    relief = (
+        f"; the ground's hollows are alike by {evidence['relief_correlation']:.2f} (correlation over {cells} cells)"
+        if cells >= FEW
+        else ""
+    )
     return (
         f"of the points that the other sensor looked at, {evidence['fitness_visible_source']:.0%} of the source's and "
         f"{evidence['fitness_visible_target']:.0%} of the target's have a neighbour there; "
         f"{evidence['agreement_least']:.0%} or more agree along each axis, "
-        f"{evidence['looked_through']:.0%} were looked through"
+        f"{evidence['looked_through']:.0%} were looked through{relief}"
     )
