@@ -27,12 +27,13 @@ _SLOTS = ("overlap", "match", "estimate")
 # Poses looked at of each entry: its own and the best of its rivals; how many of these are refined at most.
 _LOOKED_AT, _REFINED = 8, 2
 # The best poses of all, which are looked around when no entry brought certainty.
-_CLIMBED = 8
+_CLIMBED = 4
 # Log-odds below which a settled pose is neither refined nor looked around, and by which its support may fall when it is
 # refined.
 _HOPELESS, _NOISE = -3.0, 1.0
-# Least information per point along a direction that surfaces hold by themselves.
-_WEAK = 0.01
+# Log-odds above which a pose is moved to where more speaks for it, unless surfaces hold it by themselves: the least
+# information per point along any direction that they need for that.
+_LIKELY, _WEAK = 0.0, 0.01
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -118,7 +119,7 @@ class Candidates(Stage):
 def _polished(scene: Scene, found: list[Rival]) -> list[Rival]:
     # Along a direction that surfaces hardly hold, a refinement follows their noise; what else speaks holds it better.
     first, *others = found
-    if first.support <= _HOPELESS or support.seen(scene, first.T)[1].weakest >= _WEAK:
+    if first.support <= _LIKELY or support.seen(scene, first.T)[1].weakest >= _WEAK:
         return found
     climbed = scene.shared(("polished", first.T.tobytes()), lambda: climb(scene, first.T, closely=True))
     if climbed.by_surfaces < first.by_surfaces + _NOISE:

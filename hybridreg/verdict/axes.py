@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 Rows = NDArray[np.int64]
 
-# Fixed-point steps to the main axes; each about squares the error.
-_TURNS = 12
+# Fixed-point steps to the main axes, at most, and where they rest; each about squares the error.
+_TURNS, _STILL = 12, 1e-6
 # Normals of a cloud from which the axes are found.
 _SAMPLE = 1_000
 
@@ -32,7 +32,9 @@ def main_axes(*facing: Array) -> Array:
         U, _, Vt = np.linalg.svd(
             (weight * (along * along * along)).T @ normals
         )  # ** 3 takes five times as long
-        axes = U @ Vt
+        before, axes = axes, U @ Vt
+        if np.abs(axes - before).max() < _STILL:
+            break
     share = np.bincount(faced(normals, axes), weights=weight[:, 0], minlength=3)
     return axes[np.argsort(-share)]
 

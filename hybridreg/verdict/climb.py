@@ -22,10 +22,11 @@ Array = NDArray[np.float64]
 _FIRST, _LAST, _NEAR = 3.0, 0.375, 1.0
 # A turn moves points at this quantile of the distances from the middle by so many steps.
 _ARM, _TURN = 0.7, 1.5
-# Neighbours: both shifts along the commonest surface and the turn about its normal.
-_NEIGHBOURS = np.array(
-    [(x, y, turn) for x in (-1, 0, 1) for y in (-1, 0, 1) for turn in (-1, 0, 1) if (x, y, turn) != (0, 0, 0)]
-)
+# Neighbours by both shifts along the commonest surface and the turn about its normal: first those that move by one of
+# them, and where none is better all others.
+_ALL = np.array([(x, y, turn) for x in (-1, 0, 1) for y in (-1, 0, 1) for turn in (-1, 0, 1)])
+_SINGLE = np.count_nonzero(_ALL, axis=1) == 1
+_NEIGHBOURS = (_ALL[_SINGLE], _ALL[~_SINGLE & _ALL.any(axis=1)])
 # So many-th of the asked points are looked at, more about a pose that is nearly right; rounds at most, as along a
 # corridor the support may rise for ever.
 _EVERY, _CLOSELY, _ROUNDS = 5, 2, 30
@@ -54,15 +55,17 @@ def climb(scene: Scene, T_target_source: Array, *, closely: bool = False) -> Riv
 
     T, best, step = T_target_source, seen(T_target_source), _NEAR if closely else _FIRST
     for _ in range(_ROUNDS):
-        around = [_moved(T, middle, m, step * spacing, along, up, arm) for m in _NEIGHBOURS]
-        values = [seen(one) for one in around]
-        highest = int(np.argmax(values))
-        if values[highest] > best:
-            T, best = around[highest], values[highest]
-        elif step > _LAST:
-            step /= 2.0
+        for motions in _NEIGHBOURS:
+            around = [_moved(T, middle, m, step * spacing, along, up, arm) for m in motions]
+            values = [seen(one) for one in around]
+            highest = int(np.argmax(values))
+            if values[highest] > best:
+                T, best = around[highest], values[highest]
+                break
         else:
-            break
+            if step <= _LAST:
+                break
+            step /= 2.0
     return Rival(T, support.of(source, target, T, spacing))
 
 
