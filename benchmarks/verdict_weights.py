@@ -56,7 +56,7 @@ def fit_support(rows: list[Row]) -> tuple[dict[str, float], float]:
     # What speaks for a pose never speaks against it. Objections are what was looked through, and common ground, where
     # its likeness does not make up for it.
     against = ["through" in name or name == "log_relief_cells" for name in names]
-    sign = [(None, 0.0) if speaks else (0.0, None) for speaks in against]
+    sign = [(None, 0.0) if objects else (0.0, None) for objects in against]
     v = minimize(loss, np.zeros(len(sign) + 1), method="L-BFGS-B", bounds=[*sign, (None, None)]).x
     weights = v[:-1] / width
     return dict(zip(names, weights.tolist(), strict=True)), float(v[-1] - middle @ weights)

@@ -16,7 +16,7 @@ from hybridreg.classical import ground
 from hybridreg.classical.climb import climb
 from hybridreg.classical.columns import FromAbove, from_above
 from hybridreg.classical.ground import Ground
-from hybridreg.classical.sweep import Planar, sweep
+from hybridreg.classical.sweep import sweep
 from hybridreg.matches import Correspondences, Pose
 from hybridreg.resolution import map_cell
 from hybridreg.scene import Level, Scene
@@ -141,7 +141,7 @@ class BirdsEye(Stage):
         found = climb(
             source, target, peaks, cell=voxel, step_deg=0.4 * _YAW_STEP_DEG, step=0.5 * _COARSE * voxel
         )
-        return _matrices(found)
+        return found.matrices
 
     def _slid(self, source: FromAbove, target: FromAbove, voxel: float) -> list[Array]:
         """Poses at the yaw that the views have, and half a turn from it: what lies along a street or a corridor decides
@@ -151,18 +151,16 @@ class BirdsEye(Stage):
         return [
             M
             for whiten in _WHITEN
-            for M in _matrices(
-                sweep(
-                    source,
-                    target,
-                    cell=voxel,
-                    yaws=np.zeros(1),
-                    farthest=self.farthest * voxel,
-                    most=self.tries,
-                    share=0.0,
-                    whiten=whiten,
-                )
-            )
+            for M in sweep(
+                source,
+                target,
+                cell=voxel,
+                yaws=np.zeros(1),
+                farthest=self.farthest * voxel,
+                most=self.tries,
+                share=0.0,
+                whiten=whiten,
+            ).matrices
         ]
 
 
@@ -177,15 +175,6 @@ def _centred(T_level_cloud: Array, centre: Array) -> Array:
     # The same turn and heights, with a place (3,) of the cloud on the axis that the maps turn about.
     R, t = T_level_cloud[:3, :3], T_level_cloud[:3, 3]
     return se3.from_rt(R, t - (R @ centre + t) * [1.0, 1.0, 0.0])
-
-
-def _matrices(found: Planar) -> list[Array]:
-    poses = []
-    for yaw, shift in zip(found.yaw, found.shift, strict=True):
-        T = se3.yaw(float(np.degrees(yaw)))
-        T[:2, 3] = shift.real, shift.imag
-        poses.append(T)
-    return poses
 
 
 def _frames(own: Scene, scene: Scene) -> list[list[Array]]:

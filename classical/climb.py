@@ -13,8 +13,9 @@ from hybridreg.classical.sweep import Planar
 Array = NDArray[np.float64]
 Floats = NDArray[np.float32]
 
-# Neighbours of a pose, in steps of yaw and of both shifts; a step is halved after each of so many moves.
-_NEIGHBOURS = np.stack(np.meshgrid(*[[-1.0, 0.0, 1.0]] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
+# Neighbours of a motion along the ground, itself among them, in steps of its three numbers.
+NEIGHBOURS = np.stack(np.meshgrid(*[[-1.0, 0.0, 1.0]] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
+# Moves; the step is halved after each.
 _MOVES = 3
 # Columns that vote.
 _MOST_COLUMNS = 800
@@ -46,8 +47,8 @@ def climb(
     rows = np.arange(len(yaw))
     for move in range(_MOVES):
         size = 0.5**move
-        yaws = yaw[:, None] + size * np.radians(step_deg) * _NEIGHBOURS[:, 0]  # (k, 27)
-        shifts = shift[:, None] + size * step * (_NEIGHBOURS[:, 1] + 1j * _NEIGHBOURS[:, 2])
+        yaws = yaw[:, None] + size * np.radians(step_deg) * NEIGHBOURS[:, 0]  # (k, 27)
+        shifts = shift[:, None] + size * step * (NEIGHBOURS[:, 1] + 1j * NEIGHBOURS[:, 2])
         scores = _scores(table, places / cell, layer, yaws, shifts / cell)
         best = np.argmax(scores, axis=1)
         yaw, shift = yaws[rows, best], shifts[rows, best]

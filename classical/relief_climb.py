@@ -7,12 +7,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybridreg import se3
+from hybridreg.classical.climb import NEIGHBOURS
 from hybridreg.verdict.relief import Relief, looked_up, nats
 
 Array = NDArray[np.float64]
 
-# Neighbours of a motion: both shifts and the yaw; how often the step is halved; places that are looked at.
-_NEIGHBOURS = np.stack(np.meshgrid(*[[-1.0, 0.0, 1.0]] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
+# How often the step is halved, moves at each, and places that are looked at.
 _HALVINGS, _TIMES, _MOST_PLACES = 5, 2, 1_000
 # Rounds in which the grounds are laid on one another, the gap in cells from which a place counts less, and the fewest
 # places.
@@ -23,10 +23,14 @@ def climb(source: Relief, target: Relief, planar: list[Array], step: float) -> l
     """Each motion (4, 4), moved by ever shorter steps (the first in metres) to where the reliefs are most alike."""
     every = -(-len(source.places) // _MOST_PLACES)
     places = se3.apply(source.T_level_cloud, source.places[::every])[:, :2]
-    return [_climbed(places, source.heights[::every], target, T, step) for T in planar]
+    known = ~np.isnan(target.grid)
+    maps = np.where(known, target.grid, 0.0), known.astype(np.float64)
+    return [_climbed(places, source.heights[::every], target, maps, T, step) for T in planar]
 
 
-def _climbed(places: Array, heights: Array, target: Relief, T: Array, step: float) -> Array:
+def _climbed(
+    places: Array, heights: Array, target: Relief, maps: tuple[Array, Array], T: Array, step: float
+) -> Array:
     laid = places @ T[:2, :2].T + T[:2, 3]
     common = laid[~np.isnan(looked_up(target.grid, laid, target.cell))]
     # Turned about the middle of what both show, a pose does not slide.
@@ -34,9 +38,9 @@ def _climbed(places: Array, heights: Array, target: Relief, T: Array, step: floa
     arm = float(np.sqrt(np.mean(np.sum((common - middle) ** 2, axis=1)))) if len(common) else step
     x, y, yaw = np.zeros(3)
     for size in np.repeat(step * 0.5 ** np.arange(_HALVINGS), _TIMES):
-        tried = np.array([x, y, yaw]) + _NEIGHBOURS * [size, size, size / max(arm, step)]  # (27, 3)
+        tried = np.array([x, y, yaw]) + NEIGHBOURS * [size, size, size / max(arm, step)]  # (27, 3)
         moved = _turned(laid - middle, tried[:, 2]) + middle + tried[:, None, :2]
-        x, y, yaw = tried[np.argmax(_alike(heights, _between(target, moved)))]
+        x, y, yaw = tried[np.argmax(_alike(heights, _between(*maps, moved / target.cell)))]
     turn = se3.yaw(float(np.degrees(yaw)))
     turn[:2, 3] = middle - turn[:2, :2] @ middle + [x, y]
     return turn @ T
@@ -49,19 +53,18 @@ def _turned(places: Array, yaws: Array) -> Array:
     return np.stack([c * x - s * y, s * x + c * y], axis=-1)
 
 
-def _between(target: Relief, places: Array) -> Array:
-    # Heights between the middles of the four cells around places (..., 2), as far as these are known.
-    n = len(target.grid)
-    known = ~np.isnan(target.grid)
-    heights, shares = np.where(known, target.grid, 0.0).ravel(), known.astype(np.float64).ravel()
-    at = np.clip(places / target.cell + 0.5 * n - 0.5, 0.0, n - 2.0)
+def _between(heights: Array, known: Array, places: Array) -> Array:
+    # Heights between the middles of the four cells around places (..., 2), in cells, as far as these are known.
+    n = len(heights)
+    heights, known = heights.ravel(), known.ravel()
+    at = np.clip(places + 0.5 * n - 0.5, 0.0, n - 2.0)
     low = at.astype(np.int64)
     x, y = np.moveaxis(at - low, -1, 0)
     first = low[..., 0] * n + low[..., 1]
     total, weight = np.zeros(first.shape), np.zeros(first.shape)
     for step, part in ((0, (1 - x) * (1 - y)), (1, (1 - x) * y), (n, x * (1 - y)), (n + 1, x * y)):
         total += part * heights[first + step]
-        weight += part * shares[first + step]
+        weight += part * known[first + step]
     return np.where(weight > 0.5, total / np.maximum(weight, 0.5), np.nan)
 
 

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybridreg import se3
+from hybridreg.classical.sweep import BestYaws
 from hybridreg.resources import n_threads
 from hybridreg.verdict.relief import Relief, nats
 
@@ -15,8 +16,8 @@ Floats = NDArray[np.float32]
 
 # The search's cell in cells of the reliefs; degrees between yaws, and yaws at once. Hollows are metres wide.
 COARSE, _YAW_STEP_DEG, _BATCH = 2.0, 2.0, 4
-# Common cells from which heights are compared; sectors in which a place keeps a best yaw of its own.
-_FEWEST, _SECTORS = 25, 4
+# Common cells from which heights are compared.
+_FEWEST = 25
 
 
 def search(source: Relief, target: Relief, farthest: float, most: int) -> list[Array]:
@@ -42,10 +43,8 @@ def search(source: Relief, target: Relief, farthest: float, most: int) -> list[A
     reach = max(float(np.hypot(*x.T).max()) for x in (xs, xt))
     n = fft.next_fast_len(int(np.ceil((2.0 * reach + min(farthest, 2.0 * reach)) / cell)) + 2, real=True)
     place = cell * np.fft.fftfreq(n, 1.0 / n)
-    beyond = np.hypot(place[:, None], place) > farthest
     height, square, known = fft.rfft2(_maps(xt, target.heights, n, cell), workers=n_threads())
-    best = np.zeros((_SECTORS, n, n), dtype=np.float32)
-    at = np.zeros((_SECTORS, n, n), dtype=np.float32)
+    best = BestYaws(n)
     yaws = np.arange(0.0, 360.0, _YAW_STEP_DEG)
     for batch in np.array_split(yaws, -(-len(yaws) // _BATCH)):
         turned = [_maps(xs @ se3.yaw(yaw)[:2, :2].T, source.heights, n, cell) for yaw in batch]
@@ -53,14 +52,11 @@ def search(source: Relief, target: Relief, farthest: float, most: int) -> list[A
         products = np.stack([h * height, q * known, k * square, k * known])
         across, own, other, cells = fft.irfft2(products, s=(n, n), workers=n_threads())
         loud = np.sqrt(np.maximum(own * other, np.finfo(np.float32).tiny))
-        told = np.where(cells > _FEWEST - 0.5, nats(cells, across / loud), 0.0)
+        speaks = (cells > _FEWEST - 0.5) & (across > 0.0)
+        told = np.where(speaks, nats(cells, across / loud), -np.inf).astype(np.float32)
         for yaw, score in zip(batch, told, strict=True):
-            sector = int(_SECTORS * yaw / 360.0)
-            better = score > best[sector]
-            np.copyto(best[sector], score, where=better)
-            np.copyto(at[sector], yaw, where=better)
-    best[:, beyond] = 0.0
-    return _peaks(best, at, place, most)
+            best.keep(float(np.radians(yaw)), score)
+    return best.peaks(place, farthest, most, share=0.0).matrices
 
 
 def _maps(places: Array, heights: Array, n: int, cell: float) -> Floats:
@@ -70,16 +66,3 @@ def _maps(places: Array, heights: Array, n: int, cell: float) -> Floats:
     count = np.bincount(key, minlength=n * n)
     mean = np.bincount(key, heights, minlength=n * n) / np.maximum(count, 1)
     return np.stack([mean, mean * mean, count > 0]).reshape(3, n, n).astype(np.float32)
-
-
-def _peaks(best: Floats, at: Floats, place: Array, most: int) -> list[Array]:
-    from scipy.ndimage import maximum_filter
-
-    sector, i, j = np.nonzero((best == maximum_filter(best, (1, 3, 3), mode="wrap")) & (best > 0.0))
-    first = np.argsort(-best[sector, i, j], kind="stable")[:most]
-    poses = []
-    for s, x, y in zip(sector[first], i[first], j[first], strict=True):
-        T = se3.yaw(float(at[s, x, y]))
-        T[:2, 3] = place[x], place[y]
-        poses.append(T)
-    return poses

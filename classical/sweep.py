@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from hybridreg import se3
 from hybridreg.classical.columns import FromAbove
 from hybridreg.classical.signed import blurred, signed
 from hybridreg.resources import n_threads
@@ -30,6 +31,45 @@ class Planar(NamedTuple):
     yaw: Array
     shift: NDArray[np.complex128]
     score: Array
+
+    @property
+    def matrices(self) -> list[Array]:
+        """The same as motions (4, 4)."""
+        motions = []
+        for yaw, shift in zip(self.yaw, self.shift, strict=True):
+            T = se3.yaw(float(np.degrees(yaw)))
+            T[:2, 3] = shift.real, shift.imag
+            motions.append(T)
+        return motions
+
+
+class BestYaws:
+    """The best score of each shift (n, n) and its yaw, for each sector of yaws."""
+
+    def __init__(self, n: int) -> None:
+        self._score = np.full((_SECTORS, n, n), -np.inf, dtype=np.float32)
+        self._yaw = np.zeros((_SECTORS, n, n))
+
+    def keep(self, yaw: float, score: Floats) -> None:
+        """Take in the scores (n, n) of one yaw, radians in [0, 2 pi)."""
+        sector = int(_SECTORS * yaw / (2.0 * np.pi))
+        better = score > self._score[sector]
+        np.copyto(self._score[sector], score, where=better)
+        np.copyto(self._yaw[sector], yaw, where=better)
+
+    def peaks(self, place: Array, farthest: float, most: int, share: float) -> Planar:
+        """Shifts that score higher than those around them; `place` (n,) metres of a row, the rest as in `sweep`."""
+        from scipy.ndimage import maximum_filter
+
+        best = self._score
+        best[:, np.hypot(place[:, None], place) > farthest] = -np.inf
+        peak = (best == maximum_filter(best, (1, 3, 3), mode="wrap")) & np.isfinite(best)
+        sector, i, j = np.nonzero(peak)
+        score = best[sector, i, j].astype(np.float64)
+        first = np.argsort(-score, kind="stable")[:most]
+        first = first[score[first] >= share * score[first[:1]]]
+        sector, i, j = sector[first], i[first], j[first]
+        return Planar(self._yaw[sector, i, j], place[i] + 1j * place[j], score[first])
 
 
 def sweep(
@@ -77,21 +117,15 @@ def sweep(
         )
     n = fft.next_fast_len(int(np.ceil(across / cell)), real=True)
     place: Array = cell * np.fft.fftfreq(n, 1.0 / n).astype(np.float64)
-    beyond = np.hypot(place[:, None], place) > farthest
     spectrum = fft.rfft2(blurred(signed(target, 1.0, n, cell)), workers=n_threads())
-    best = np.full((_SECTORS, n, n), -np.inf, dtype=np.float32)
-    at = np.zeros((_SECTORS, n, n))
+    best = BestYaws(n)
     for batch in np.array_split(yaws, -(-len(yaws) // _BATCH)):
         turned = np.stack([signed(source, np.exp(1j * yaw), n, cell) for yaw in batch])
         product = _products(fft.rfft2(turned, workers=n_threads()), spectrum, whiten)
         both = np.concatenate([batch, batch + np.pi])
         for yaw, score in zip(both, fft.irfft2(product, s=(n, n), workers=n_threads()), strict=True):
-            sector = int(_SECTORS * yaw / (2.0 * np.pi))
-            better = score > best[sector]
-            np.copyto(best[sector], score, where=better)
-            np.copyto(at[sector], yaw, where=better)
-    best[:, beyond] = -np.inf
-    return _peaks(best, at, place, most, share)
+            best.keep(yaw, score)
+    return best.peaks(place, farthest, most, share)
 
 
 def _products(source: Complexes, target: Complexes, whiten: float) -> Complexes:
@@ -111,15 +145,3 @@ def _products(source: Complexes, target: Complexes, whiten: float) -> Complexes:
 def _extent(view: FromAbove) -> float:
     # Twice the greatest distance of a filled column, whatever the yaw.
     return 2.0 * float(np.abs(view.filled.places).max(initial=0.0)) / np.sqrt(2.0)
-
-
-def _peaks(best: Floats, at: Array, place: Array, most: int, share: float) -> Planar:
-    from scipy.ndimage import maximum_filter
-
-    peak = (best == maximum_filter(best, (1, 3, 3), mode="wrap")) & np.isfinite(best)
-    sector, i, j = np.nonzero(peak)
-    score = best[sector, i, j].astype(np.float64)
-    first = np.argsort(-score, kind="stable")[:most]
-    first = first[score[first] >= share * score[first[:1]]]
-    sector, i, j = sector[first], i[first], j[first]
-    return Planar(at[sector, i, j], place[i] + 1j * place[j], score[first])

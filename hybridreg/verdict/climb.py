@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybridreg import se3
+from hybridreg.classical.climb import NEIGHBOURS
 from hybridreg.scene import Scene
 from hybridreg.verdict import support, views
 from hybridreg.verdict.axes import main_axes
@@ -24,9 +25,8 @@ _FIRST, _LAST, _NEAR = 3.0, 0.375, 1.0
 _ARM, _TURN = 0.7, 1.5
 # Neighbours by both shifts along the commonest surface and the turn about its normal: first those that move by one of
 # them, and where none is better all others.
-_ALL = np.array([(x, y, turn) for x in (-1, 0, 1) for y in (-1, 0, 1) for turn in (-1, 0, 1)])
-_SINGLE = np.count_nonzero(_ALL, axis=1) == 1
-_NEIGHBOURS = (_ALL[_SINGLE], _ALL[~_SINGLE & _ALL.any(axis=1)])
+_MOVED = np.count_nonzero(NEIGHBOURS, axis=1)
+_NEIGHBOURS = (NEIGHBOURS[_MOVED == 1], NEIGHBOURS[_MOVED > 1])
 # So many-th of the asked points are looked at, more about a pose that is nearly right; rounds at most, as along a
 # corridor the support may rise for ever.
 _EVERY, _CLOSELY, _ROUNDS = 5, 2, 30

@@ -180,12 +180,15 @@ def _around(height: Array, known: Mask) -> Array:
 
     x, y = np.meshgrid(*[np.arange(len(height)) - 0.5 * len(height)] * 2, indexing="ij")
 
-    def mean(values: Array) -> Array:
-        found: Array = uniform_filter(np.where(known, values, 0.0), 2 * _AROUND + 1, mode="constant") / share
+    def box(values: Array) -> Array:
+        found: Array = uniform_filter(np.where(known, values, 0.0), 2 * _AROUND + 1, mode="constant")
         return found
 
-    share = np.ones(1)
-    share = np.maximum(mean(np.ones_like(height)), 1e-9)
+    share = np.maximum(box(np.ones_like(height)), 1e-9)
+
+    def mean(values: Array) -> Array:
+        return box(values) / share
+
     x_, y_, z_ = mean(x), mean(y), mean(height)
     xx, xy, yy = mean(x * x) - x_ * x_ + _FIRM, mean(x * y) - x_ * y_, mean(y * y) - y_ * y_ + _FIRM
     xz, yz = mean(x * height) - x_ * z_, mean(y * height) - y_ * z_
