@@ -5,7 +5,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import product
 from typing import Literal
 
 import numpy as np
@@ -37,8 +36,8 @@ _YAW_STEP_DEG, _SHARE = 4.0, 0.5
 _LEVELLED, _WHITEN = (0.5, 0.0), (0.0, 0.75)
 # Peaks looked at first, and the support beyond which the others are not looked at: twice the log-odds of "ok".
 _FIRST, _BEYOND_DOUBT = 10, 2.0 * NEARLY
-# Degrees: a sensor whose ground leans so much hangs on its head; from this lean on the plane may be askew, or a wall.
-_UPTURNED_DEG, _LEANS_DEG = 140.0, 10.0
+# Degrees: a sensor whose ground leans so much hangs on its head.
+_UPTURNED_DEG = 140.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -52,11 +51,13 @@ class BirdsEye(Stage):
     support. The height follows from the two ground planes. The others come back as `rivals`.
 
     Where a cloud shows no ground, its sensor is taken to stand upright (or on its head, if the other one does) and
-    its lowest points to be the ground; a note says so. Where the ground that it shows leans, it may be a wall or
-    askew: the vertical that the sensor's frame has is tried too, unless the ground's pose is plain.
+    its lowest points to be the ground; a note says so.
 
     Parameters
     ----------
+    vertical : "ground" or "sensor"
+        What levels the clouds: the ground that each shows, in whatever way its sensor hung; or the z axes of both
+        sensors, for those that stand upright and show a wall or a ceiling, or a ground that is askew.
     voxel : float or None
         Resolution, metres; None takes 0.5, less where the clouds reach less than 30 m.
     layers : tuple of float
@@ -67,12 +68,15 @@ class BirdsEye(Stage):
         Poses settled and ranked, at most.
     """
 
+    vertical: Literal["ground", "sensor"] = "ground"
     voxel: float | None = None
     layers: tuple[float, ...] = (0.6, 2.0, 4.0, 8.0, 20.0)
     farthest: float = 120.0
     tries: int = 40
 
     def __post_init__(self) -> None:
+        if self.vertical not in ("ground", "sensor"):
+            raise ValueError(f"vertical={self.vertical!r} must be 'ground' or 'sensor'")
         if self.voxel is not None and not 0.0 < self.voxel < np.inf:
             raise ValueError(f"voxel={self.voxel} must be a positive length in metres")
         if len(self.layers) < 2 or not (np.diff(self.layers) > 0.0).all():
@@ -85,12 +89,8 @@ class BirdsEye(Stage):
     def __call__(self, scene: Scene, matches: Correspondences, rng: np.random.Generator) -> Pose:
         voxel = self.voxel or map_cell(scene.pair.source, scene.pair.target)
         own = ground.on_grid(scene, voxel)
-        found: list[Rival] = []
-        for frames in product(*_frames(own, scene)):
-            laid = self._laid(scene, own, frames, voxel)
-            found += laid
-            if laid and laid[0].support >= NEARLY:
-                break
+        frames = _by_ground(own, scene) if self.vertical == "ground" else _by_sensor(own)
+        found = self._laid(scene, own, frames, voxel)
         if not found:
             scene.note("bird's-eye search: nothing stands on the ground")
             return Pose.unknown()
@@ -177,25 +177,26 @@ def _centred(T_level_cloud: Array, centre: Array) -> Array:
     return se3.from_rt(R, t - (R @ centre + t) * [1.0, 1.0, 0.0])
 
 
-def _frames(own: Scene, scene: Scene) -> list[list[Array]]:
-    # For each cloud what levels it by the ground it shows, and by what may be the ground instead.
+def _by_ground(own: Scene, scene: Scene) -> list[Array]:
+    # What levels each cloud by the ground it shows, or by what may be the ground instead.
     found = {side: ground.find(own, side) for side in _SIDES}
     frames = []
     for side, other in zip(_SIDES, reversed(_SIDES), strict=True):
         shown, known = found[side], found[other]
-        head_down = known is not None and known.up[2] < np.cos(np.radians(_UPTURNED_DEG))
         level = getattr(own, side)
-        assumed = _level_frame(_assumed(level.points, -1.0 if head_down else 1.0), level)
         if shown is None:
+            head_down = known is not None and known.up[2] < np.cos(np.radians(_UPTURNED_DEG))
+            shown = _assumed(level.points, -1.0 if head_down else 1.0)
             scene.note(
                 f"bird's-eye search: no ground found in the {side}; its sensor is taken to "
                 f"{'hang on its head, as the other does' if head_down else 'stand upright'}"
             )
-            frames.append([assumed])
-        else:
-            leans = abs(shown.up[2]) < np.cos(np.radians(_LEANS_DEG))
-            frames.append([_level_frame(shown, level), assumed] if leans else [_level_frame(shown, level)])
+        frames.append(_level_frame(shown, level))
     return frames
+
+
+def _by_sensor(own: Scene) -> list[Array]:
+    return [_level_frame(_assumed(level.points, 1.0), level) for level in (own.source, own.target)]
 
 
 def _assumed(points: Array, sign: float) -> Ground:

@@ -18,6 +18,7 @@ from hybridreg.stage import Stage
 from hybridreg.verdict import rivals, support, weigh
 from hybridreg.verdict.climb import climb
 from hybridreg.verdict.confidence import NEARLY, OK
+from hybridreg.verdict.hop import hop
 from hybridreg.verdict.rivals import Rival
 
 Array = NDArray[np.float64]
@@ -27,7 +28,7 @@ _SLOTS = ("overlap", "match", "estimate")
 # Poses looked at of each entry: its own and the best of its rivals; how many of these are refined at most.
 _LOOKED_AT, _REFINED = 8, 2
 # The best poses of all, which are looked around when no entry brought certainty.
-_CLIMBED = 4
+_LOOKED_AROUND = 4
 # Log-odds below which a settled pose is neither refined nor looked around, and by which its support may fall when it is
 # refined.
 _HOPELESS, _NOISE = -3.0, 1.0
@@ -91,16 +92,17 @@ class Candidates(Stage):
         found: list[Rival] = []
         answers: list[list[Rival]] = []
         # A generator each, so that an entry's answer does not hang on those before it.
-        for entry, own in zip(self.of, rng.spawn(len(self.of)), strict=True):
+        *generators, last = rng.spawn(len(self.of) + 1)
+        for entry, own in zip(self.of, generators, strict=True):
             pose = _pose(entry, scene, matches, own)
             if pose.found and np.isfinite(pose.T).all():
                 offered = rivals.best_first(scene, [pose.T, *pose.rivals[: _LOOKED_AT - 1]])
                 answers.append(offered)
                 found = _polished(scene, rivals.counted(scene, self._joined(scene, found, offered), answers))
             yield found
-        hopeful = [one for one in found[:_CLIMBED] if one.support > _HOPELESS]
+        hopeful = [one for one in found[:_LOOKED_AROUND] if one.support > _HOPELESS]
         if hopeful:
-            near = rivals.distinct(scene, [climb(scene, one.T) for one in hopeful])
+            near = rivals.distinct(scene, [hop(scene, one.T, last) for one in hopeful])
             yield _polished(scene, rivals.counted(scene, self._joined(scene, found, near), answers))
 
     def _joined(self, scene: Scene, found: list[Rival], offered: list[Rival]) -> list[Rival]:
@@ -122,7 +124,7 @@ def _polished(scene: Scene, found: list[Rival]) -> list[Rival]:
     first, *others = found
     if first.support <= _LIKELY or support.seen(scene, first.T)[1].weakest >= _WEAK:
         return found
-    climbed = scene.shared(("polished", first.T.tobytes()), lambda: climb(scene, first.T, closely=True))
+    climbed = scene.shared(("polished", first.T.tobytes()), lambda: climb(scene, first.T))
     if climbed.by_surfaces < first.by_surfaces + _NOISE:
         return found
     scene.shared(("polished", climbed.T.tobytes()), lambda: climbed)

@@ -19,29 +19,23 @@ from hybridreg.verdict.rivals import Rival
 
 Array = NDArray[np.float64]
 
-# First and last step along the commonest surface, in spacings, and the first one where a pose is nearly right.
-_FIRST, _LAST, _NEAR = 3.0, 0.375, 1.0
+# First and last step along the commonest surface, in spacings.
+_FIRST, _LAST = 1.0, 0.375
 # A turn moves points at this quantile of the distances from the middle by so many steps.
 _ARM, _TURN = 0.7, 1.5
 # Neighbours by both shifts along the commonest surface and the turn about its normal: first those that move by one of
 # them, and where none is better all others.
 _MOVED = np.count_nonzero(NEIGHBOURS, axis=1)
 _NEIGHBOURS = (NEIGHBOURS[_MOVED == 1], NEIGHBOURS[_MOVED > 1])
-# So many-th of the asked points are looked at, more about a pose that is nearly right; rounds at most, as along a
-# corridor the support may rise for ever.
-_EVERY, _CLOSELY, _ROUNDS = 5, 2, 30
+# So many-th of the asked points are looked at; rounds at most, as along a corridor the support may rise for ever.
+_EVERY, _ROUNDS = 2, 30
 
 
-def climb(scene: Scene, T_target_source: Array, *, closely: bool = False) -> Rival:
+def climb(scene: Scene, T_target_source: Array) -> Rival:
     """Where a pattern search for more support (Hooke and Jeeves 1961) ends that begins at a pose (4, 4).
 
     Only the three motions that leave the commonest surface (the ground) where it is are tried. The pose is not settled
     afterwards: surfaces might draw it back.
-
-    Parameters
-    ----------
-    closely : bool
-        The pose is nearly right: take shorter steps and look at more points.
     """
     source, target = views.views(scene)
     spacing = views.spacing(scene)
@@ -51,9 +45,9 @@ def climb(scene: Scene, T_target_source: Array, *, closely: bool = False) -> Riv
     arm = float(np.quantile(np.linalg.norm(source.points - middle, axis=1), _ARM)) or spacing
 
     def seen(T: Array) -> float:
-        return support.of(source, target, T, spacing, _CLOSELY if closely else _EVERY)
+        return support.of(source, target, T, spacing, _EVERY)
 
-    T, best, step = T_target_source, seen(T_target_source), _NEAR if closely else _FIRST
+    T, best, step = T_target_source, seen(T_target_source), _FIRST
     for _ in range(_ROUNDS):
         for motions in _NEIGHBOURS:
             around = [_moved(T, middle, m, step * spacing, along, up, arm) for m in motions]

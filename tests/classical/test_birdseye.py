@@ -123,6 +123,13 @@ def test_a_wall_that_passes_for_the_ground_does_not_decide_alone() -> None:
     assert min(metres for degrees, metres in poses if degrees < 3.0) < 0.6
 
 
+@pytest.mark.parametrize(("tilt", "right"), [(2.0, True), (178.0, False)])
+def test_levelled_by_the_sensors_frames_only_upright_ones_fit(tilt: float, right: bool) -> None:
+    pair, truth = two_views(pose(8.0, -5.0, 70.0, tilt), pose(0.0, 0.0, 0.0, -2.0))
+    degrees, metres = wrong_by(run(pair, vertical="sensor")[0].T, truth)
+    assert (degrees < 1.5 and metres < 0.4) == right
+
+
 RNG = np.random.default_rng(0)
 FLAT = np.column_stack([RNG.uniform(-30, 30, (4000, 2)), RNG.normal(-1.8, 0.01, 4000)])
 HOSTILE = {
@@ -160,6 +167,7 @@ def test_disjoint_places_give_some_pose_within_reach() -> None:
 @pytest.mark.parametrize(
     ("fields", "words"),
     [
+        ({"vertical": "wall"}, "'ground' or 'sensor'"),
         ({"voxel": 0.0}, "voxel=0.0"),
         ({"layers": (1.0,)}, "two or more"),
         ({"layers": (2.0, 1.0)}, "rising"),

@@ -1,0 +1,53 @@
+# SPDX-License-Identifier: MIT
+"""The best supported of the places near a pose where surfaces let it rest.
+
+Where clouds share a wall and a few things, a pose rests at several places some decimetres or degrees apart, and comes
+to the one that lies nearest to where it began; the support tells which of them is right.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hybridreg import se3
+from hybridreg.scene import Scene
+from hybridreg.verdict import support, views
+from hybridreg.verdict.rivals import Rival
+from hybridreg.verdict.settle import settle
+
+Array = NDArray[np.float64]
+
+# Hops from each pose, and the standard deviations of one: degrees about each axis, spacings along it.
+_HOPS, _TURN_DEG, _SHIFT = 24, 3.0, 2.0
+# So many-th of the settling points and of the asked points are used.
+_SETTLING, _LOOKING = 3, 2
+
+
+def hop(scene: Scene, T_target_source: Array, rng: np.random.Generator) -> Rival:
+    """Where basin hopping (Wales and Doye 1997) for more support ends that begins at a pose (4, 4).
+
+    The pose is shaken, settles anew, and stays there where it has more support.
+    """
+    source, target = views.views(scene)
+    spacing = views.spacing(scene)
+    middle = source.points.mean(axis=0)
+
+    def seen(T: Array) -> float:
+        return support.of(source, target, T, spacing, _LOOKING)
+
+    T, best = T_target_source, seen(T_target_source)
+    for _ in range(_HOPS):
+        start = _shaken(T, middle, spacing, rng)
+        settled = settle(source, target, start, spacing, every=_SETTLING)
+        value = seen(settled)
+        if value > best:
+            T, best = settled, value
+    return Rival(T, support.of(source, target, T, spacing))
+
+
+def _shaken(T: Array, middle: Array, spacing: float, rng: np.random.Generator) -> Array:
+    # About the middle of the source, so that a turn leaves it where it is.
+    centre = se3.apply(T, middle[None])[0]
+    turn = se3.rotation_about(np.radians(rng.normal(0.0, _TURN_DEG, 3)))
+    return se3.from_rt(turn, centre - turn @ centre + rng.normal(0.0, _SHIFT * spacing, 3)) @ T
