@@ -28,7 +28,7 @@ _ARM, _TURN = 0.7, 1.5
 _MOVED = np.count_nonzero(NEIGHBOURS, axis=1)
 _NEIGHBOURS = (NEIGHBOURS[_MOVED == 1], NEIGHBOURS[_MOVED > 1])
 # So many-th of the asked points are looked at; rounds at most, as along a corridor the support may rise for ever.
-_EVERY, _ROUNDS = 2, 30
+_EVERY, _ROUNDS = 2, 15
 
 
 def climb(scene: Scene, T_target_source: Array) -> Rival:
