@@ -27,10 +27,10 @@ Entry = Mapping[str, Any]
 _SLOTS = ("overlap", "match", "estimate")
 # Poses looked at of each entry: its own and the best of its rivals; how many of these are refined at most.
 _LOOKED_AT, _REFINED = 8, 2
-# The best poses of all, which are looked around when no entry brought certainty.
-_LOOKED_AROUND = 4
-# Log-odds below which a settled pose is neither refined nor looked around, and by which its support may fall when it is
-# refined.
+# The best poses of all, which are looked around when no entry brought certainty, unless their log-odds lie below this:
+# half a metre beside the right pose they may well be there.
+_LOOKED_AROUND, _LOST = 4, -7.0
+# Log-odds below which a settled pose is not refined, and by which its support may fall when it is refined.
 _HOPELESS, _NOISE = -3.0, 1.0
 # Log-odds above which a pose is moved to where more speaks for it, unless surfaces hold it by themselves: the least
 # information per point along any direction that they need for that.
@@ -100,7 +100,7 @@ class Candidates(Stage):
                 answers.append(offered)
                 found = _polished(scene, rivals.counted(scene, self._joined(scene, found, offered), answers))
             yield found
-        hopeful = [one for one in found[:_LOOKED_AROUND] if one.support > _HOPELESS]
+        hopeful = [one for one in found[:_LOOKED_AROUND] if one.support > _LOST]
         if hopeful:
             near = rivals.distinct(scene, [hop(scene, one.T, last) for one in hopeful])
             yield _polished(scene, rivals.counted(scene, self._joined(scene, found, near), answers))
