@@ -29,10 +29,11 @@ def outcomes(folder: Path) -> tuple[Array, NDArray[np.bool_]]:
     """Confidence (n,) of every run in a folder, and whether its pose is right (n,)."""
     rows = [row for file in sorted((folder / "predictions").glob("*")) for row in store.read(file).rows]
     told = [row for row in rows if row.confidence is not None]
-    return np.array([row.confidence for row in told], dtype=np.float64), np.array([_right(r) for r in told])
+    return np.array([row.confidence for row in told], dtype=np.float64), np.array([is_right(r) for r in told])
 
 
-def _right(row: Row) -> bool:
+def is_right(row: Row) -> bool:
+    """Whether the pose of a run is within 2 degrees and 0.5 m; on disjoint pairs none is."""
     if row.T is None or row.T_true is None or "/disjoint/" in row.id:
         return False
     T, truth = np.array(row.T), np.array(row.T_true)

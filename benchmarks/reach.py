@@ -1,0 +1,62 @@
+# SPDX-License-Identifier: MIT
+"""How do methods do where one sensor sees but its immediate surroundings?
+
+    hybridreg table default.toml --data "sim:val/mid#100" --starts 0 --out runs/val-mid
+    python -m benchmarks.reach runs/val-mid --data "sim:val/mid#100"
+
+A cloud's reach is the distance from its middle within which nine tenths of its points lie; a pair's is that of the
+cloud with the shorter one. A narrow sensor a few metres before a wall or a hedge reaches a few metres, and shows hardly
+more than one surface of a place that the other sensor sees whole.
+"""
+
+from __future__ import annotations
+
+import argparse
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+
+from benchmarks.calibration import is_right
+from hybridreg.data import open_dataset
+from hybridreg.eval import store
+from hybridreg.resolution import reach
+
+# Metres.
+BORDERS = (0.0, 6.0, 12.0, 25.0, np.inf)
+
+
+def outcomes(folder: Path, data: str) -> list[tuple[float, bool, bool]]:
+    """Of each pair: reach in metres, whether its pose is right, and whether it was called ok."""
+    rows = [row for file in sorted((folder / "predictions").glob("*")) for row in store.read(file).rows]
+    clouds = {labelled.pair.id: labelled.pair for labelled in open_dataset(data)}
+    return [
+        (min(reach(cloud.radii) for cloud in (pair.source, pair.target)), is_right(row), row.verdict == "ok")
+        for row in rows
+        if (pair := clouds.get(row.id)) is not None and row.confidence is not None
+    ]
+
+
+def table(found: list[tuple[float, bool, bool]]) -> str:
+    """Markdown: pairs, right poses, and right ones that were called ok, for each class of reach."""
+    metres, right, ok = (np.array(column) for column in zip(*found, strict=True))
+    lines = ["| reach, m | pairs | right | right and ok |", "|---|---|---|---|"]
+    for low, high in pairwise(BORDERS):
+        here = (metres >= low) & (metres < high)
+        name = f"{low:.0f} to {high:.0f}" if np.isfinite(high) else f"beyond {low:.0f}"
+        lines.append(f"| {name} | {here.sum()} | {right[here].sum()} | {(right & ok)[here].sum()} |")
+    return "\n".join(lines)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("run", type=Path, help="folder that `hybridreg table` wrote")
+    parser.add_argument("--data", required=True, help="the data set of the run")
+    options = parser.parse_args()
+    print(table(outcomes(options.run, options.data)))
+
+
+if __name__ == "__main__":
+    main()
