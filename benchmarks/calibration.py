@@ -27,9 +27,14 @@ _BINS = (0.0, 0.05, 0.25, 0.5, 0.75, OK, 1.0)
 
 def outcomes(folder: Path) -> tuple[Array, NDArray[np.bool_]]:
     """Confidence (n,) of every run in a folder, and whether its pose is right (n,)."""
-    rows = [row for file in sorted((folder / "predictions").glob("*")) for row in store.read(file).rows]
-    told = [row for row in rows if row.confidence is not None]
+    told = answered(folder)
     return np.array([row.confidence for row in told], dtype=np.float64), np.array([is_right(r) for r in told])
+
+
+def answered(folder: Path) -> list[Row]:
+    """The runs in a folder that have a verdict."""
+    rows = [row for file in sorted((folder / "predictions").glob("*")) for row in store.read(file).rows]
+    return [row for row in rows if row.confidence is not None]
 
 
 def is_right(row: Row) -> bool:

@@ -17,9 +17,8 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.calibration import is_right
+from benchmarks.calibration import answered, is_right
 from hybridreg.data import open_dataset
-from hybridreg.eval import store
 from hybridreg.resolution import reach
 
 # Metres.
@@ -28,12 +27,11 @@ BORDERS = (0.0, 6.0, 12.0, 25.0, np.inf)
 
 def outcomes(folder: Path, data: str) -> list[tuple[float, bool, bool]]:
     """Of each pair: reach in metres, whether its pose is right, and whether it was called ok."""
-    rows = [row for file in sorted((folder / "predictions").glob("*")) for row in store.read(file).rows]
     clouds = {labelled.pair.id: labelled.pair for labelled in open_dataset(data)}
     return [
         (min(reach(cloud.radii) for cloud in (pair.source, pair.target)), is_right(row), row.verdict == "ok")
-        for row in rows
-        if (pair := clouds.get(row.id)) is not None and row.confidence is not None
+        for row in answered(folder)
+        if (pair := clouds.get(row.id)) is not None
     ]
 
 

@@ -71,7 +71,7 @@ def perturbed(clouds: Clouds, truth: Array) -> Iterator[Case]:
     up, street, across = spread[:, 0], spread[:, 2], spread[:, 1]
     half = se3.rotation_about(np.pi * up)
     for centre in (moved.mean(axis=0), truth[:3, 3]):
-        turned = se3.from_rt(half, centre - half @ centre) @ truth
+        turned = se3.about(centre, half) @ truth
         yield "half a turn, refined", clouds.refine(turned), truth
     for direction, lengths in ((street, (-10.0, -5.0, 5.0, 10.0)), (across, (-5.0, 5.0))):
         for length in lengths:

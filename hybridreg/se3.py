@@ -31,6 +31,11 @@ def inverse(T: Array) -> Array:
     return from_rt(R, -R @ T[:3, 3])
 
 
+def about(centre: Array, R: Array, shift: Array | float = 0.0) -> Array:
+    """Rigid motion (4, 4) that turns by R (3, 3) about a place (3,), and then moves it by `shift` (3,)."""
+    return from_rt(R, centre - R @ centre + shift)
+
+
 def exp(twist: Array) -> Array:
     """Rigid motion (4, 4) of a twist (6,): rotation vector in radians first, then the translation itself.
 

@@ -91,3 +91,11 @@ def test_exp_is_linear_near_zero() -> None:
     T = se3.exp(twist)
     assert np.allclose(T[:3, :3], np.eye(3) + se3.skew(twist[:3]), atol=1e-14)
     assert np.allclose(T[:3, 3], twist[3:])
+
+
+@given(st.lists(st.floats(-3.0, 3.0), min_size=9, max_size=9))
+def test_a_turn_about_a_place_leaves_it_but_for_the_shift(numbers: list[float]) -> None:
+    centre, vector, shift = np.array(numbers).reshape(3, 3)
+    T = se3.about(centre, se3.rotation_about(vector), shift)
+    assert np.allclose(se3.apply(T, centre[None])[0], centre + shift, atol=1e-12)
+    assert np.array_equal(T[:3, :3], se3.rotation_about(vector))

@@ -66,4 +66,4 @@ def climb(scene: Scene, T_target_source: Array) -> Rival:
 def _moved(T: Array, middle: Array, motion: Array, step: float, along: Array, up: Array, arm: float) -> Array:
     centre = se3.apply(T, middle[None])[0]
     turn = se3.rotation_about(motion[2] * _TURN * step / arm * up)
-    return se3.from_rt(turn, centre - turn @ centre + step * motion[:2] @ along) @ T
+    return se3.about(centre, turn, step * motion[:2] @ along) @ T

@@ -50,4 +50,4 @@ def _shaken(T: Array, middle: Array, spacing: float, rng: np.random.Generator) -
     # About the middle of the source, so that a turn leaves it where it is.
     centre = se3.apply(T, middle[None])[0]
     turn = se3.rotation_about(np.radians(rng.normal(0.0, _TURN_DEG, 3)))
-    return se3.from_rt(turn, centre - turn @ centre + rng.normal(0.0, _SHIFT * spacing, 3)) @ T
+    return se3.about(centre, turn, rng.normal(0.0, _SHIFT * spacing, 3)) @ T

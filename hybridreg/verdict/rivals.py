@@ -161,7 +161,7 @@ def _turned(
     guesses = []
     for axis in axes:
         half = se3.rotation_about(np.pi * axis)
-        about = se3.from_rt(half, centre - half @ centre) @ T
+        about = se3.about(centre, half) @ T
         gap = middle - _middle(se3.apply(about, source.points), axes)
         guesses += [about, se3.from_rt(np.eye(3), gap - axis * (gap @ axis)) @ about]
     return [guesses[0], *guesses[1::2]]

@@ -50,11 +50,5 @@ def settle(
         J = jacobian(points - centre, normals)
         H = (J * weight[:, None]).T @ J
         twist = -np.linalg.solve(H + 1e-6 * np.trace(H) * np.eye(6), J.T @ (weight * gap))
-        T = _about(centre, twist) @ T
+        T = se3.about(centre, se3.rotation_about(twist[:3]), twist[3:]) @ T
     return T
-
-
-def _about(centre: Array, twist: Array) -> Array:
-    step = se3.exp(twist)
-    step[:3, 3] += centre - step[:3, :3] @ centre
-    return step
