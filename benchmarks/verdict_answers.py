@@ -26,7 +26,7 @@ from hybridreg.matches import Correspondences, Pose
 from hybridreg.pair import Pair
 from hybridreg.scene import Scene
 from hybridreg.verdict import matched, support, weigh
-from hybridreg.verdict.rivals import Rival, as_pose
+from hybridreg.verdict.rivals import Rival, as_pose, told_apart
 
 Array = NDArray[np.float64]
 Row = dict[str, Any]
@@ -75,21 +75,28 @@ def answers(scene: Scene, truth: Array | None, metres: float) -> Iterator[Row]:
 
 def _told(scene: Scene, found: list[Rival]) -> Row:
     weighed = weigh(scene, as_pose(found))
-    rival = [weigh(scene, Pose(one.T, found=False)).evidence for one in weighed.rivals[:1]]
+    rival = [
+        {**weigh(scene, Pose(one.T, found=False)).evidence, "closeness": one.closeness}
+        for one in weighed.rivals[:1]
+    ]
     return {"evidence": weighed.evidence, "rival": rival}
 
 
 def _ranked(scene: Scene, found: list[Rival], truth: Array | None, metres: float) -> Row:
     # Evidence of the poses, and the rows of the right ones. What is nearly right is left out.
-    poses = [(one.T, one.recipes, _right(one.T, truth, metres)) for one in found[:_RANKED]]
-    poses = [pose for pose in poses if pose[2] is not None]
-    if truth is not None and not any(right for *_, right in poses):
+    poses = [(one, _right(one.T, truth, metres)) for one in found[:_RANKED]]
+    poses = [pose for pose in poses if pose[1] is not None]
+    if truth is not None and not any(right for _, right in poses):
         # No recipe came to it, which must not speak against recipes that meet.
-        poses = [*((T, 1, right) for T, _, right in poses), (truth, 1, True)]
+        poses = [(one._replace(recipes=1), right) for one, right in poses]
+        own = support.support(support.numbers(*support.seen(scene, truth)))
+        poses = [*poses, (Rival(truth, own, matched=matched.share(scene, truth)), True)]
+    told = told_apart(scene, [one._replace(closeness=0.0) for one, _ in poses])
     evidence = [
-        support.numbers(*support.seen(scene, T), recipes, matched.share(scene, T)) for T, recipes, _ in poses
+        support.numbers(*support.seen(scene, one.T), one.recipes, matched.share(scene, one.T), one.closeness)
+        for one in told
     ]
-    return {"evidence": evidence, "right": [k for k, (*_, right) in enumerate(poses) if right]}
+    return {"evidence": evidence, "right": [k for k, (_, right) in enumerate(poses) if right]}
 
 
 def _right(T: Array, truth: Array | None, metres: float) -> bool | None:

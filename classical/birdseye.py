@@ -21,7 +21,7 @@ from hybridreg.resolution import map_cell
 from hybridreg.scene import Level, Scene
 from hybridreg.stage import Stage
 from hybridreg.verdict.confidence import NEARLY
-from hybridreg.verdict.rivals import Rival, best_first, distinct
+from hybridreg.verdict.rivals import BEYOND_DOUBT, Rival, best_first, distinct
 
 Array = NDArray[np.float64]
 Side = Literal["source", "target"]
@@ -34,8 +34,8 @@ _YAW_STEP_DEG, _SHARE = 4.0, 0.5
 # How far the spectra are levelled: at first by half, so that the few things on a field are heard beside a wall or a
 # wood, and not at all when no pose is plain then; and in the second look.
 _LEVELLED, _WHITEN = (0.5, 0.0), (0.0, 0.75)
-# Peaks looked at first, and the support beyond which the others are not looked at: twice the log-odds of "ok".
-_FIRST, _BEYOND_DOUBT = 10, 2.0 * NEARLY
+# Peaks looked at first; the others are not where one of these is beyond doubt.
+_FIRST = 10
 # Degrees: a sensor whose ground leans so much hangs on its head.
 _UPTURNED_DEG = 140.0
 
@@ -108,7 +108,7 @@ class BirdsEye(Stage):
             poses = [
                 T_target_level @ M @ T_level_source for M in self._planar(source, target, voxel, levelled)
             ]
-            for some, plain in ((poses[:_FIRST], _BEYOND_DOUBT), (poses[_FIRST:], NEARLY)):
+            for some, plain in ((poses[:_FIRST], BEYOND_DOUBT), (poses[_FIRST:], NEARLY)):
                 found += best_first(scene, some)
                 found.sort(key=lambda rival: -rival.support)
                 if found and found[0].support >= plain:

@@ -44,8 +44,8 @@ class Candidates(Stage):
     Every pose that an entry offers is settled and ranked by the verdict's own support (`hybridreg.verdict.support`),
     the best ones are refined, and the best of these is weighed with the others as its rivals. A pose to which
     several entries came is believed the more; one that surfaces hardly hold is moved to where it has more support.
-    Later entries are not run once the confidence is `enough`; when none brings it, better supported poses are looked
-    for around the best ones. What was not chosen comes back as `rivals`.
+    Later entries are not run once the confidence is `enough`; when none brings it, all that was found is looked at a
+    second time, and better supported poses are looked for around the best ones. What was not chosen comes back as `rivals`.
 
     Parameters
     ----------
@@ -88,7 +88,7 @@ class Candidates(Stage):
     def stages(
         self, scene: Scene, matches: Correspondences, rng: np.random.Generator
     ) -> Iterator[list[Rival]]:
-        """What is found after each entry, and after looking around at the end, the best supported first."""
+        """What is found after each entry, and after a second look at the end, the best supported first."""
         found: list[Rival] = []
         answers: list[list[Rival]] = []
         # A generator each, so that an entry's answer does not hang on those before it.
@@ -100,6 +100,9 @@ class Candidates(Stage):
                 answers.append(offered)
                 found = _polished(scene, rivals.counted(scene, self._joined(scene, found, offered), answers))
             yield found
+        if found:
+            again = rivals.second_look(scene)
+            found = rivals.counted(scene, rivals.distinct(scene, [*found, *again]), answers)
         hopeful = [one for one in found[:_LOOKED_AROUND] if one.support > _LOST]
         if hopeful:
             near = rivals.distinct(scene, [hop(scene, one.T, last) for one in hopeful])

@@ -36,7 +36,9 @@ class Gicp(Stage):
     Parameters
     ----------
     voxel : float or None
-        Grid on which the clouds are compared, metres; None takes 0.6 of the levels' spacing.
+        Grid on which the clouds are compared, metres; None takes a share of the levels' spacing.
+    fineness : float
+        That share. A coarser grid takes less time and is a little less exact.
     max_distances : tuple of float or None
         Farthest partner in each round, metres; None takes 5, 2.5 and 1.25 spacings.
     neighbours : int
@@ -46,19 +48,20 @@ class Gicp(Stage):
     """
 
     voxel: float | None = None
+    fineness: float = 0.6
     max_distances: tuple[float, ...] | None = None
     neighbours: int = 20
     iterations: int = 30
 
     def __post_init__(self) -> None:
-        limits.positive(self, "voxel", "max_distances")
+        limits.positive(self, "voxel", "fineness", "max_distances")
         limits.at_least(self, _FEWEST_NEIGHBOURS, "neighbours")
         limits.at_least(self, 1, "iterations")
 
     def __call__(self, scene: Scene, pose: Pose) -> Pose:
         import small_gicp
 
-        voxel = self.voxel or 0.6 * scene.spacing
+        voxel = self.voxel or self.fineness * scene.spacing
         distances = self.max_distances or (5 * scene.spacing, 2.5 * scene.spacing, 1.25 * scene.spacing)
         T = pose.T
         near = _within(scene, T, voxel, _FAR * max(distances))

@@ -13,36 +13,39 @@ from numpy.typing import NDArray
 from hybridreg import se3
 from hybridreg.scene import Scene
 from hybridreg.verdict import support, views
+from hybridreg.verdict.closeness import closeness, settle_closely
 from hybridreg.verdict.rivals import Rival
 from hybridreg.verdict.settle import settle
 
 Array = NDArray[np.float64]
 
 # Hops from each pose, and the standard deviations of one: degrees about each axis, spacings along it.
-_HOPS, _TURN_DEG, _SHIFT = 24, 3.0, 2.0
-# So many-th of the settling points and of the asked points are used.
-_SETTLING, _LOOKING = 3, 2
+_HOPS, _TURN_DEG, _SHIFT = 10, 3.0, 2.0
+# So many-th of the settling points, of the asked points, and of those asked about closely are used.
+_SETTLING, _LOOKING, _CLOSELY = 3, 3, 4
 
 
 def hop(scene: Scene, T_target_source: Array, rng: np.random.Generator) -> Rival:
     """Where basin hopping (Wales and Doye 1997) for more support ends that begins at a pose (4, 4).
 
-    The pose is shaken, settles anew, and stays there where it has more support.
+    The pose is shaken, settles anew, roughly and closely, and stays where it has more support and lies closer.
     """
     source, target = views.views(scene)
     spacing = views.spacing(scene)
     middle = source.points.mean(axis=0)
 
     def seen(T: Array) -> float:
-        return support.of(source, target, T, spacing, _LOOKING)
+        close = closeness(scene, T, _CLOSELY)
+        return support.of(source, target, T, spacing, _LOOKING) + support.beside(1, 0.0, close)
 
     T, best = T_target_source, seen(T_target_source)
     for _ in range(_HOPS):
         start = _shaken(T, middle, spacing, rng)
-        settled = settle(source, target, start, spacing, every=_SETTLING)
-        value = seen(settled)
-        if value > best:
-            T, best = settled, value
+        roughly = settle(source, target, start, spacing, every=_SETTLING)
+        for settled in (roughly, settle_closely(scene, roughly)):
+            value = seen(settled)
+            if value > best:
+                T, best = settled, value
     return Rival(T, support.of(source, target, T, spacing))
 
 

@@ -123,14 +123,22 @@ def _weigh(scene: Scene, pose: Pose) -> Weighed:
     agreement, held = support.seen(scene, pose.T)
     _, target = views.views(scene)
     found = rivals.find(scene, pose.T, agreement, held, pose.rivals) if pose.found else []
-    evidence = evidence_of(agreement, held, found, target, pose.recipes, matched.share(scene, pose.T))
+    own = Rival(
+        pose.T,
+        support.support(support.numbers(agreement, held)),
+        pose.recipes,
+        matched.share(scene, pose.T),
+    )
+    own, *found = rivals.told_apart(scene, [own, *found])
+    found.sort(key=lambda rival: -rival.support)
+    evidence = evidence_of(agreement, held, own, found, target)
     return Weighed(
         agreement=agreement, held=held, rivals=found, evidence=evidence, confidence=confidence(evidence)
     )
 
 
 def evidence_of(
-    agreement: Agreement, held: Information, found: list[Rival], target: View, recipes: int, matched: float
+    agreement: Agreement, held: Information, own: Rival, found: list[Rival], target: View
 ) -> dict[str, float]:
     """The numbers behind a verdict; shares lie between 0 and 1.
 
@@ -151,13 +159,15 @@ def evidence_of(
     weakest : smallest eigenvalue of the information per point, at most 1/3
     recipes : methods that came to the pose independently of one another
     matched : agreeing share of the matches of that matcher of which most agree; 0 where none ran
+    closeness : how much less closely the points lie on the surfaces, to the sensors' noise, than under the rival where
+        they do most, nats per point; 0 where they lie most closely, or where no rival comes near
     support : log-odds that the pose is right, were there no other
     rival_margin : how far the best rival's support lies above it (-20 without rivals)
     """
-    own = support.numbers(agreement, held, recipes, matched)
-    of_pose = support.support(own)
+    numbers = support.numbers(agreement, held, own.recipes, own.matched, own.closeness)
+    of_pose = support.support(numbers)
     evidence = {
-        **own,
+        **numbers,
         "support": of_pose,
         "rival_margin": found[0].support - of_pose if found else NO_RIVAL,
         **_surfaces(agreement.source, target),

@@ -15,6 +15,8 @@ from hybridreg.matches import Pose
 from hybridreg.scene import Scene
 from hybridreg.verdict import matched, support, views
 from hybridreg.verdict.agreement import Agreement
+from hybridreg.verdict.closeness import closeness, settle_closely
+from hybridreg.verdict.confidence import NEARLY
 from hybridreg.verdict.information import Information
 from hybridreg.verdict.settle import settle
 from hybridreg.verdict.views import View
@@ -31,21 +33,27 @@ _QUICK, _CLOSE, _ROUGHLY = 10, 2, 3
 # Best of many starts that are looked at closely, unless the support of one lies so far below the best: of 112 that did
 # on 32 pairs of `sim:val`, none came out the best.
 _KEPT, _LEFT = 8, 12.0
+# Starts that are looked at again when no pose is certain.
+_AGAIN = 24
+# Support (log-odds) from which a pose is beyond doubt: twice that of "ok". Below it, poses that have so much less than
+# the best one are told apart by their closeness.
+BEYOND_DOUBT, _CONTENDS = 2.0 * NEARLY, 8.0
 
 
 class Rival(NamedTuple):
-    """A pose (4, 4), its support by the surfaces alone (log-odds), how many recipes came to it, and the share of
-    matches that agrees with it."""
+    """A pose (4, 4), its support by the surfaces alone (log-odds), how many recipes came to it, the share of matches
+    that agrees with it, and its closeness (nats) less that of the pose beside it which lies most closely."""
 
     T: Array
     by_surfaces: float
     recipes: int = 1
     matched: float = 0.0
+    closeness: float = 0.0
 
     @property
     def support(self) -> float:
         """Log-odds that the pose is right, were there no other."""
-        return self.by_surfaces + support.beside(self.recipes, self.matched)
+        return self.by_surfaces + support.beside(self.recipes, self.matched, self.closeness)
 
 
 def as_pose(found: Sequence[Rival]) -> Pose:
@@ -61,11 +69,27 @@ def best_first(scene: Scene, starts: Sequence[Array]) -> list[Rival]:
     known = _known(scene)
     resting = [known[one.tobytes()] for one in starts if one.tobytes() in known]
     quickly = [_settled(scene, one, _ROUGHLY) for one in starts if one.tobytes() not in known]
+    _tried(scene).extend(quickly)
     apart = distinct(scene, quickly)[:_KEPT]
     closely = [_settled(scene, one.T, 1) if one.support > apart[0].support - _LEFT else one for one in apart]
     found = [*resting, *closely]
     known.update((one.T.tobytes(), one) for one in found)
     return distinct(scene, found)[:_KEPT]
+
+
+def second_look(scene: Scene) -> list[Rival]:
+    """The best supported of all starts of the run, each settled on surfaces as fine as the clouds show them.
+
+    What a rough look took for one of many may lie closest of all.
+    """
+    tried = sorted(_tried(scene), key=lambda rival: -rival.support)[: 3 * _AGAIN]
+    source, target = views.views(scene)
+    spacing = views.spacing(scene)
+    found = []
+    for one in distinct(scene, tried)[:_AGAIN]:
+        T = settle_closely(scene, one.T)
+        found.append(Rival(T, support.of(source, target, T, spacing, _CLOSE)))
+    return found
 
 
 def resting(scene: Scene, poses: Iterable[Array]) -> list[Rival]:
@@ -81,6 +105,11 @@ def _settled(scene: Scene, start: Array, every: int) -> Rival:
     spacing = views.spacing(scene)
     T = settle(source, target, start, spacing, every=3 * every, wide=every == 1)
     return Rival(T, support.of(source, target, T, spacing, every))
+
+
+def _tried(scene: Scene) -> list[Rival]:
+    # Every start of the run, roughly settled.
+    return scene.shared(("verdict", "tried"), list)
 
 
 def _known(scene: Scene) -> dict[bytes, Rival]:
@@ -107,9 +136,20 @@ def counted(scene: Scene, found: Iterable[Rival], answers: Iterable[Iterable[Riv
     def told(one: Rival) -> Rival:
         centre = se3.apply(one.T, middle)[0]
         came = [any(not differs(other.T, one.T, centre, spacing) for other in answer) for answer in answers]
-        return one._replace(recipes=max(sum(came), 1), matched=matched.share(scene, one.T))
+        return one._replace(recipes=max(sum(came), 1), matched=matched.share(scene, one.T), closeness=0.0)
 
-    return sorted(map(told, found), key=lambda rival: -rival.support)
+    return sorted(told_apart(scene, [told(one) for one in found]), key=lambda rival: -rival.support)
+
+
+def told_apart(scene: Scene, found: Sequence[Rival]) -> list[Rival]:
+    """The same poses in the same order, with their closeness where it may decide which of them is right."""
+    best = max((one.support for one in found), default=BEYOND_DOUBT)
+    rows = [row for row, one in enumerate(found) if one.support > best - _CONTENDS]
+    if best >= BEYOND_DOUBT or len(rows) < 2:
+        return list(found)
+    close = {row: closeness(scene, found[row].T) for row in rows}
+    closest = max(close.values())
+    return [one._replace(closeness=close.get(row, closest) - closest) for row, one in enumerate(found)]
 
 
 def find(

@@ -18,7 +18,8 @@ Array = NDArray[np.float64]
 _STEPS, _WIDE = (6.0, 4.0, 3.0, 2.0, 2.0), (12.0, 10.0, 8.0, 6.0, 5.0, 4.0, 3.0, 2.0, 2.0)
 # Width of the weights where the search is wide, per search distance.
 _TRUST = 0.25
-_FEWEST = 30
+# Partners that a step takes, at least.
+FEWEST = 30
 
 
 def settle(
@@ -38,17 +39,24 @@ def settle(
         moved = se3.apply(T, source.points[rows])
         distance, match = target.tree.query(moved, distance_upper_bound=step * spacing)
         hit = np.isfinite(distance)
-        if np.count_nonzero(hit) < _FEWEST:
+        if np.count_nonzero(hit) < FEWEST:
             return T
-        points, match = moved[hit], np.asarray(match)[hit]
-        normals = target.normals[match]
-        gap = np.einsum("ni,ni->n", points - target.points[match], normals)
-        # Cauchy weights: half of the neighbours of a wrong guess are no neighbours.
+        match = np.asarray(match)[hit]
         width = spacing * max(1.0, _TRUST * step) if wide else spacing
-        weight = 1.0 / (1.0 + (gap / width) ** 2)
-        centre = points.mean(axis=0)
-        J = jacobian(points - centre, normals)
-        H = (J * weight[:, None]).T @ J
-        twist = -np.linalg.solve(H + 1e-6 * np.trace(H) * np.eye(6), J.T @ (weight * gap))
-        T = se3.about(centre, se3.rotation_about(twist[:3]), twist[3:]) @ T
+        T = step_onto(target.points[match], target.normals[match], moved[hit], width) @ T
     return T
+
+
+def step_onto(planes: Array, normals: Array, points: Array, width: float) -> Array:
+    """Motion (4, 4) of one step of point-to-plane ICP that brings `points` (n, 3) nearer to `planes` through points
+    (n, 3) with `normals` (n, 3).
+
+    Cauchy weights of `width` metres: half of the neighbours of a wrong guess are no neighbours.
+    """
+    gap = np.einsum("ni,ni->n", points - planes, normals)
+    weight = 1.0 / (1.0 + (gap / width) ** 2)
+    centre = points.mean(axis=0)
+    J = jacobian(points - centre, normals)
+    H = (J * weight[:, None]).T @ J
+    twist = -np.linalg.solve(H + 1e-6 * np.trace(H) * np.eye(6), J.T @ (weight * gap))
+    return se3.about(centre, se3.rotation_about(twist[:3]), twist[3:])

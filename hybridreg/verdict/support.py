@@ -75,17 +75,27 @@ def terms(evidence: Mapping[str, float]) -> dict[str, float]:
         "log_weakest": float(np.log10(evidence["weakest"] + _UNHELD)),
         "log_recipes": float(np.log(evidence["recipes"])),
         "matched": evidence["matched"],
+        "closeness": evidence["closeness"],
     }
 
 
-def beside(recipes: int, matched: float) -> float:
-    """What it adds to a pose's support that so many recipes came to it, and that this share of matches agrees."""
+def beside(recipes: int, matched: float, closeness: float = 0.0) -> float:
+    """What it adds to a pose's support that so many recipes came to it, that this share of matches agrees, and that
+    it lies less closely than another (nats, at most nought)."""
     weights = model().weights
-    return weights["log_recipes"] * float(np.log(recipes)) + weights["matched"] * matched
+    return (
+        weights["log_recipes"] * float(np.log(recipes))
+        + weights["matched"] * matched
+        + weights["closeness"] * closeness
+    )
 
 
 def numbers(
-    agreement: Agreement, held: Information, recipes: int = 1, matched: float = 0.0
+    agreement: Agreement,
+    held: Information,
+    recipes: int = 1,
+    matched: float = 0.0,
+    closeness: float = 0.0,
 ) -> dict[str, float]:
     """What tells of one pose by itself; see `hybridreg.verdict.judgement.evidence_of`."""
     least, middle, most = np.sort(agreement.shares)
@@ -105,6 +115,7 @@ def numbers(
         "weakest": held.weakest,
         "recipes": recipes,
         "matched": matched,
+        "closeness": closeness,
     }
     for side, way in (("source", agreement.source), ("target", agreement.target)):
         found[f"looked_through_{side}"] = share(way.free, way.looked)

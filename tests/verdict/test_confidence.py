@@ -39,6 +39,7 @@ EVIDENCE = {
     "weakest": st.floats(0.0, 1.0 / 3.0),
     "recipes": st.integers(1, 5),
     "matched": share,
+    "closeness": st.floats(-3.0, 0.0),
 }
 own = st.fixed_dictionaries(EVIDENCE)
 log_odds = st.floats(-15.0, 15.0)
@@ -85,18 +86,23 @@ def test_the_rule_weighs_the_terms_and_nothing_else() -> None:
         "weakest": 0.02,
         "recipes": 1,
         "matched": 0.4,
+        "closeness": -0.2,
     }
     assert set(model().weights) == set(terms(numbers))
     assert support({**numbers, "normals": 0.9}) == support(numbers)
 
 
 @given(own)
-def test_recipes_that_came_to_a_pose_and_matches_that_agree_add_to_its_support(
+def test_recipes_that_came_to_a_pose_matches_that_agree_and_closeness_add_to_its_support(
     numbers: dict[str, float],
 ) -> None:
-    alone, joined = ({**numbers, "recipes": n, "matched": share} for n, share in ((1, 0.0), (3, 0.5)))
-    assert support(joined) - support(alone) == pytest.approx(beside(3, 0.5))
-    assert beside(1, 0.0) == 0.0 < beside(2, 0.0) < beside(3, 0.0) < beside(3, 0.1) < beside(3, 0.2)
+    alone, joined = (
+        {**numbers, "recipes": n, "matched": share, "closeness": nats}
+        for n, share, nats in ((1, 0.0, 0.0), (3, 0.5, -0.4))
+    )
+    assert support(joined) - support(alone) == pytest.approx(beside(3, 0.5, -0.4))
+    assert beside(1, 0.0, -0.5) < beside(1, 0.0, -0.1) < 0.0
+    assert beside(1, 0.0) == 0.0 <= beside(2, 0.0) <= beside(3, 0.0) < beside(3, 0.1) < beside(3, 0.2)
 
 
 @given(whole, st.sampled_from([name for name in SPEAKS if name in WHOLE and SPEAKS[name]]), share)

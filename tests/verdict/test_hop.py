@@ -11,6 +11,7 @@ from hybridreg.cloud import PointCloud
 from hybridreg.pair import Pair
 from hybridreg.scene import Scene
 from hybridreg.verdict import support, views
+from hybridreg.verdict.closeness import closeness
 from hybridreg.verdict.hop import hop
 from hybridreg.verdict.settle import settle
 
@@ -47,12 +48,16 @@ def test_a_pose_that_rests_beside_the_right_one_leaves_for_it(street: tuple[Scen
     assert metres < 0.4
 
 
-def test_support_is_that_of_the_pose_and_no_less_than_before(street: tuple[Scene, np.ndarray]) -> None:
+def test_support_and_closeness_are_no_less_than_before(street: tuple[Scene, np.ndarray]) -> None:
     scene, truth = street
     source, target = views.views(scene)
     start = started(scene, truth)
     end = hop(scene, start, np.random.default_rng(1))
-    before, after = (support.of(source, target, T, views.spacing(scene), every=2) for T in (start, end.T))
+    before, after = (
+        support.of(source, target, T, views.spacing(scene), every=3)
+        + support.beside(1, 0.0, closeness(scene, T, 4))
+        for T in (start, end.T)
+    )
     assert after >= before
     assert end.by_surfaces == support.of(source, target, end.T, views.spacing(scene))
 
