@@ -44,8 +44,9 @@ class Candidates(Stage):
     Every pose that an entry offers is settled and ranked by the verdict's own support (`hybridreg.verdict.support`),
     the best ones are refined, and the best of these is weighed with the others as its rivals. A pose to which
     several entries came is believed the more; one that surfaces hardly hold is moved to where it has more support.
-    Later entries are not run once the confidence is `enough`; when none brings it, all that was found is looked at a
-    second time, and better supported poses are looked for around the best ones. What was not chosen comes back as `rivals`.
+    Later entries are not run once the confidence is `enough`; when none brings it, all that was tried is looked at a
+    second time, and better supported poses are looked for around the best ones. What was not chosen comes back as
+    `rivals`.
 
     Parameters
     ----------

@@ -174,11 +174,25 @@ def _beside(things: Mask) -> Mask:
 
 
 def _around(height: Array, known: Mask) -> Array:
-    # Height at each cell of the plane through the known cells around it: a mean would take a slope for a hollow where
-    # the known cells lie to one side.
+    # Height at each cell of the plane through the known cells around it, 0 where there are none: a mean would take a
+    # slope for a hollow where the known cells lie to one side.
+    around = np.zeros_like(height)
+    if known.any():
+        # Elsewhere is nothing to compute, and a sensor seldom shows ground all over the map.
+        part = tuple(_reached(known.any(axis=1 - axis)) for axis in (0, 1))
+        around[part] = _planes_around(height[part], known[part])
+    return around
+
+
+def _reached(known: Mask) -> slice:
+    rows = np.flatnonzero(known)
+    return slice(max(int(rows[0]) - _AROUND, 0), int(rows[-1]) + _AROUND + 1)
+
+
+def _planes_around(height: Array, known: Mask) -> Array:
     from scipy.ndimage import uniform_filter
 
-    x, y = np.meshgrid(*[np.arange(len(height)) - 0.5 * len(height)] * 2, indexing="ij")
+    x, y = np.meshgrid(*[np.arange(n) - 0.5 * n for n in height.shape], indexing="ij")
 
     def box(values: Array) -> Array:
         found: Array = uniform_filter(np.where(known, values, 0.0), 2 * _AROUND + 1, mode="constant")
