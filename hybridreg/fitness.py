@@ -3,7 +3,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +13,7 @@ from scipy.spatial import cKDTree
 
 from hybridreg import se3
 from hybridreg.extent import bounds
-from hybridreg.resources import n_threads
+from hybridreg.resources import n_threads, n_workers
 
 Array = NDArray[np.float64]
 
@@ -35,6 +37,39 @@ class Fitness:
     fitness: float
     inlier_rmse: float
     correspondence_set: NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False)
+class Overlay:
+    """Two whole clouds laid on one another, (N, 3) and (M, 3), with a distance in metres.
+
+    What is measured on every point takes as long as a quick registration's search, so it is measured when it is first
+    asked for.
+    """
+
+    source: Array = field(repr=False)
+    target: Array = field(repr=False)
+    T_target_source: Array = field(repr=False)
+    max_distance: float
+
+    @cached_property
+    def _both_ways(self) -> tuple[Fitness, Fitness]:
+        # Side by side, as one thread alone builds a tree.
+        with ThreadPoolExecutor(min(2, n_workers())) as pool:
+            T = self.T_target_source
+            forth = pool.submit(measure, self.source, self.target, T, self.max_distance)
+            back = pool.submit(measure, self.target, self.source, se3.inverse(T), self.max_distance)
+            return forth.result(), back.result()
+
+    @property
+    def of_source(self) -> Fitness:
+        """The source on the target."""
+        return self._both_ways[0]
+
+    @property
+    def of_target(self) -> Fitness:
+        """The target on the source."""
+        return self._both_ways[1]
 
 
 def measure(source: Array, target: cKDTree | Array, T: Array, max_distance: float) -> Fitness:

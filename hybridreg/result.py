@@ -12,10 +12,15 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from hybridreg.fitness import Overlay
 from hybridreg.matches import Correspondences
 
 Array = NDArray[np.float64]
 Word = Literal["ok", "doubtful", "failed"]
+
+
+# Numbers measured on the whole clouds.
+_MEASURED = ("fitness", "inlier_rmse", "fitness_target", "max_distance")
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -31,16 +36,8 @@ class RegistrationResult:
     confidence : float in [0, 1]
     reasons : tuple of str
         Why the verdict is what it is, in words.
-    fitness : float
-        Share of the source's points that have a target point within `max_distance`. As in Open3D.
-    inlier_rmse : float
-        Root mean square distance of those points, metres. As in Open3D.
-    correspondence_set : (K, 2) int64
-        Those points: row in the source, row of the nearest target point. As in Open3D.
-    fitness_target : float
-        The same share seen from the target.
-    max_distance : float
-        Metres.
+    overlay : Overlay
+        Both whole clouds at the pose, on which `fitness` and what goes with it is measured when first asked for.
     information : (6, 6) float64
         Sum of J^T J of point-to-plane distances in metres at the pose, rotation (radians) before translation,
         about the centre of the overlap; a small eigenvalue is a direction that the data leaves open.
@@ -66,11 +63,7 @@ class RegistrationResult:
     verdict: Word
     confidence: float
     reasons: tuple[str, ...]
-    fitness: float
-    inlier_rmse: float
-    correspondence_set: NDArray[np.int64] = field(repr=False)
-    fitness_target: float
-    max_distance: float
+    overlay: Overlay
     information: Array = field(repr=False)
     rivals: Array = field(repr=False)
     matches: Correspondences = field(repr=False)
@@ -86,10 +79,36 @@ class RegistrationResult:
         """The transformation, under the name that tells its direction."""
         return self.transformation
 
+    @property
+    def fitness(self) -> float:
+        """Share of the source's points that have a target point within `max_distance`, as in Open3D."""
+        return self.overlay.of_source.fitness
+
+    @property
+    def inlier_rmse(self) -> float:
+        """Root mean square distance of those points, metres, as in Open3D."""
+        return self.overlay.of_source.inlier_rmse
+
+    @property
+    def correspondence_set(self) -> NDArray[np.int64]:
+        """Those points (K, 2): row in the source, row of the nearest target point, as in Open3D."""
+        return self.overlay.of_source.correspondence_set
+
+    @property
+    def fitness_target(self) -> float:
+        """The share seen from the target."""
+        return self.overlay.of_target.fitness
+
+    @property
+    def max_distance(self) -> float:
+        """Farthest that two points of `correspondence_set` lie apart, metres."""
+        return self.overlay.max_distance
+
     def to_dict(self) -> dict[str, Any]:
         """Plain numbers, lists and strings; the per-point arrays become their counts."""
-        left_out = {"correspondence_set", "matches"}
+        left_out = {"overlay", "matches"}
         plain = {f.name: _plain(getattr(self, f.name)) for f in fields(self) if f.name not in left_out}
+        plain |= {name: getattr(self, name) for name in _MEASURED}
         return {**plain, "n_correspondences": len(self.correspondence_set), "n_matches": len(self.matches)}
 
     def to_json(self) -> str:

@@ -16,6 +16,7 @@ from typer.testing import CliRunner, Result
 import hybridreg as hr
 from hybridreg import se3, testing
 from hybridreg.cli.app import app
+from hybridreg.fitness import Overlay
 from hybridreg.pipeline import Trace
 from hybridreg.result import RegistrationResult
 
@@ -26,8 +27,8 @@ def judged(self: hr.Pipeline, trace: Trace, *, seed: int = 0, verdict: Any = "ok
     """A pipeline's result under a verdict that the test chooses."""
     return RegistrationResult(
         transformation=trace.refined.T, verdict=verdict, confidence=0.5, reasons=("because", "and so"),
-        fitness=0.7, inlier_rmse=0.1, correspondence_set=np.zeros((3, 2), np.int64), fitness_target=0.6,
-        max_distance=0.5, information=np.eye(6), rivals=np.zeros((0, 4, 4)), matches=trace.matches,
+        overlay=Overlay(np.eye(3), np.eye(3), np.eye(4), 0.5), information=np.eye(6),
+        rivals=np.zeros((0, 4, 4)), matches=trace.matches,
         evidence={"violations": 0.01}, notes=tuple(trace.scene.notes),
         seconds={**trace.seconds, "verdict": 0.01}, peak_memory_mb=1.0, seed=seed, spec=self.to_spec(),
     )  # fmt: skip

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Fitness of large clouds, whose points are asked for in another order."""
+"""Fitness is measured when it is asked for; points of large clouds are asked for in another order."""
 
 from __future__ import annotations
 
@@ -25,3 +25,21 @@ def test_the_order_of_the_questions_changes_no_answer(
     assert plain.fitness == ordered.fitness >= 0.3
     assert plain.inlier_rmse == ordered.inlier_rmse
     assert np.array_equal(plain.correspondence_set, ordered.correspondence_set)
+
+
+def test_it_is_measured_both_ways_once_and_not_before_it_is_asked_for(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    calls = []
+    measure = fitness.measure
+    monkeypatch.setattr(fitness, "measure", lambda *given: calls.append(given) or measure(*given))
+    source, target = np.array([[0.0, 0.0, 0.0], [5.0, 5.0, 5.0]]), np.array([[1.0, 0.0, 0.0]])
+    T = np.eye(4)
+    T[0, 3] = 0.9
+    overlay = fitness.Overlay(source, target, T, 0.2)
+    assert not calls
+    assert overlay.of_source.fitness == 0.5
+    assert overlay.of_source.inlier_rmse == pytest.approx(0.1)
+    assert overlay.of_source.correspondence_set.tolist() == [[0, 0]]
+    assert overlay.of_target.fitness == 1.0
+    assert len(calls) == 2

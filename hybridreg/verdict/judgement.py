@@ -3,16 +3,13 @@
 
 from __future__ import annotations
 
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from hybridreg import se3
-from hybridreg.fitness import Fitness, measure
+from hybridreg.fitness import Overlay
 from hybridreg.matches import Correspondences, Pose
-from hybridreg.resources import n_workers
 from hybridreg.scene import Scene
 from hybridreg.verdict import matched, rivals, support, views
 from hybridreg.verdict.agreement import Agreement, OneWay
@@ -58,12 +55,8 @@ class Judgement:
     reasons : tuple of str
     evidence : dict of str to float
         Always the same keys, see `evidence_of`.
-    fitness : Fitness
-        Of the whole source cloud on the whole target cloud, as Open3D's `evaluate_registration`.
-    fitness_target : float
-        Share of the target's points that have a source point within `max_distance`.
-    max_distance : float
-        Metres: twice the scene's spacing.
+    overlay : Overlay
+        The whole clouds under the pose, within twice the scene's spacing of one another.
     information : (6, 6) float64
         See `hybridreg.verdict.information.Information`.
     rivals : (r, 4, 4) float64
@@ -74,9 +67,7 @@ class Judgement:
     confidence: float
     reasons: tuple[str, ...]
     evidence: dict[str, float]
-    fitness: Fitness
-    fitness_target: float
-    max_distance: float
+    overlay: Overlay
     information: Array
     rivals: Array
 
@@ -90,8 +81,6 @@ def judge(scene: Scene, pose: Pose, matches: Correspondences) -> Judgement:
     weighed = weigh(scene, pose)
     evidence = {**weighed.evidence, "matches_agreeing": float(matched.agreeing(scene, matches, pose.T))}
     probability = weighed.confidence if pose.found else 0.0
-    max_distance = 2.0 * scene.spacing
-    fitness, fitness_target = _fitness(scene, pose.T, max_distance)
     return Judgement(
         verdict=word(probability),
         confidence=probability,
@@ -99,9 +88,7 @@ def judge(scene: Scene, pose: Pose, matches: Correspondences) -> Judgement:
             evidence, weighed.agreement, weighed.held, found=pose.found, images=_images(*views.views(scene))
         ),
         evidence=evidence,
-        fitness=fitness,
-        fitness_target=fitness_target,
-        max_distance=max_distance,
+        overlay=Overlay(scene.pair.source.points, scene.pair.target.points, pose.T, 2.0 * scene.spacing),
         information=weighed.held.matrix,
         rivals=_close(weighed.rivals, weighed.evidence["support"]),
     )
@@ -192,15 +179,6 @@ def _surfaces(way: OneWay, target: View) -> dict[str, float]:
 
 def _images(source: View, target: View) -> tuple[str, ...]:
     return tuple(name for name, view in (("source", source), ("target", target)) if view.image is not None)
-
-
-def _fitness(scene: Scene, T: Array, max_distance: float) -> tuple[Fitness, float]:
-    source, target = scene.pair.source.points, scene.pair.target.points
-    # Side by side, as one thread alone builds a tree.
-    with ThreadPoolExecutor(min(2, n_workers())) as pool:
-        forth = pool.submit(measure, source, target, T, max_distance)
-        back = pool.submit(measure, target, source, se3.inverse(T), max_distance)
-        return forth.result(), back.result().fitness
 
 
 def _close(found: list[Rival], support: float) -> Array:

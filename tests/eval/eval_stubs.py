@@ -15,6 +15,7 @@ from hybridreg import se3
 from hybridreg.cloud import PointCloud
 from hybridreg.data.dataset import Dataset
 from hybridreg.eval.row import Row
+from hybridreg.fitness import Overlay
 from hybridreg.matches import Correspondences, Overlap, Pose
 from hybridreg.pair import LabelledPair, Pair
 from hybridreg.pipeline import Trace
@@ -86,12 +87,15 @@ class RowByRow:
         confidence = float(np.random.default_rng(seed).uniform())
         return RegistrationResult(
             transformation=raise_pose(trace.refined.T, pair), verdict="ok", confidence=confidence,
-            reasons=("rows agree",), fitness=0.5, inlier_rmse=0.0,
-            correspondence_set=np.zeros((0, 2), np.int64), fitness_target=1.0,
-            max_distance=0.1, information=np.eye(6), rivals=np.zeros((0, 4, 4)),
+            reasons=("rows agree",), overlay=_HALF,
+            information=np.eye(6), rivals=np.zeros((0, 4, 4)),
             matches=raise_matches(trace.matches, pair), evidence={"violations": float("nan")}, notes=(),
             seconds=trace.seconds, peak_memory_mb=None, seed=seed, spec=self.to_spec(),
         )  # fmt: skip
+
+
+# One of two points lies on the only one of the target.
+_HALF = Overlay(np.array([[0.0, 0.0, 0.0], [5.0, 5.0, 5.0]]), np.zeros((1, 3)), np.eye(4), 0.1)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -98,7 +98,7 @@ def test_a_pose_that_lays_the_clouds_apart_is_failed(crossing: Made) -> None:
     far = se3.from_rt(np.eye(3), np.array([0.0, 0.0, 5000.0]))
     judgement = judge(crossing.scene, Pose(far), NONE)
     assert judgement.verdict == "failed"
-    assert judgement.fitness.fitness == judgement.fitness_target == 0.0
+    assert judgement.overlay.of_source.fitness == judgement.overlay.of_target.fitness == 0.0
     assert all(np.isfinite(value) for value in judgement.evidence.values())
 
 
@@ -146,13 +146,13 @@ def test_fitness_is_open3ds(crossing: Made) -> None:
     pair = crossing.scene.pair
     points = (pair.source.points.copy(), pair.target.points.copy())
     clouds = [o3d.geometry.PointCloud(o3d.utility.Vector3dVector(p)) for p in points]
-    distance = judgement.max_distance
+    distance = judgement.overlay.max_distance
     theirs = o3d.pipelines.registration.evaluate_registration(*clouds, distance, crossing.truth)
     assert distance == 2.0 * crossing.scene.spacing
-    assert judgement.fitness.fitness == pytest.approx(theirs.fitness, abs=1e-12)
-    assert judgement.fitness.inlier_rmse == pytest.approx(theirs.inlier_rmse, abs=1e-9)
-    assert len(judgement.fitness.correspondence_set) == len(theirs.correspondence_set)
+    assert judgement.overlay.of_source.fitness == pytest.approx(theirs.fitness, abs=1e-12)
+    assert judgement.overlay.of_source.inlier_rmse == pytest.approx(theirs.inlier_rmse, abs=1e-9)
+    assert len(judgement.overlay.of_source.correspondence_set) == len(theirs.correspondence_set)
     back = o3d.pipelines.registration.evaluate_registration(
         *clouds[::-1], distance, se3.inverse(crossing.truth)
     )
-    assert judgement.fitness_target == pytest.approx(back.fitness, abs=1e-12)
+    assert judgement.overlay.of_target.fitness == pytest.approx(back.fitness, abs=1e-12)
