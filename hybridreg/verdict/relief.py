@@ -179,7 +179,7 @@ def _around(height: Array, known: Mask) -> Array:
     around = np.zeros_like(height)
     if known.any():
         # Elsewhere is nothing to compute, and a sensor seldom shows ground all over the map.
-        part = tuple(_reached(known.any(axis=1 - axis)) for axis in (0, 1))
+        part = tuple(_reached(np.asarray(known.any(axis=1 - axis))) for axis in (0, 1))
         around[part] = _planes_around(height[part], known[part])
     return around
 
