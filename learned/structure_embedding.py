@@ -66,7 +66,6 @@ def neighbor_angles(anchors: Tensor, points: Tensor, nearest: Tensor) -> Tensor:
     """Angles (b, n, k) in radians at anchors (b, 3), between points (n, 3) and neighbours (b, k, 3)."""
     to_point = (points[None] - anchors[:, None])[:, :, None]  # (b, n, 1, 3)
     to_near = (nearest - anchors[:, None])[:, None]  # (b, 1, k, 3)
-    shape = torch.broadcast_shapes(to_point.shape, to_near.shape)
-    to_point, to_near = to_point.expand(shape), to_near.expand(shape)
+    to_point, to_near = torch.broadcast_tensors(to_point, to_near)
     sine = torch.linalg.cross(to_near, to_point, dim=-1).norm(dim=-1)
     return torch.atan2(sine, (to_near * to_point).sum(-1))
