@@ -13,7 +13,7 @@ from hybridreg.learned.pyramid import Pyramid
 _FLOAT = 4
 _LINK = 84  # bytes a link: two indices, offset and length, and the tenth of the kernel points that it reaches
 _COPIES = 4  # of a stage's widest features alive at a time: input, output, and the steps between
-_CONSTANT = 38 * 2**20  # working buffers, which are of fixed size, and the libraries' own
+_CONSTANT = 2**26  # working buffers, which are of fixed size, and the libraries' own
 
 
 def forward_bytes(pyramid: Pyramid, config: NetworkConfig) -> int:

