@@ -17,7 +17,8 @@ from hybridreg.learned.blocks import (
     linear_on_joined,
 )
 from hybridreg.learned.config import BackboneConfig
-from hybridreg.learned.influence import find_links
+from hybridreg.learned.dense_influence import DenseLinks
+from hybridreg.learned.influence import Links, find_links
 from hybridreg.learned.pyramid import Pyramid
 
 
@@ -115,7 +116,7 @@ def _block(plan: BlockPlan, first: bool, rng: np.random.Generator | None) -> nn.
 
 def _plain(pyramid: Pyramid, stage: int, cylindrical: bool) -> Surroundings:
     points, lengths, neighbors = pyramid.points[stage], pyramid.lengths[stage], pyramid.neighbors[stage]
-    links = find_links(points, points, neighbors, cylindrical=cylindrical)
+    links = _links(points, points, neighbors, cylindrical)
     return Surroundings(neighbors, lengths, lengths, links)
 
 
@@ -125,10 +126,13 @@ def _strided(pyramid: Pyramid, stage: int, cylindrical: bool) -> Surroundings:
         neighbors,
         lengths=pyramid.lengths[stage],
         support_lengths=pyramid.lengths[stage - 1],
-        links=find_links(
-            pyramid.points[stage], pyramid.points[stage - 1], neighbors, cylindrical=cylindrical
-        ),
+        links=_links(pyramid.points[stage], pyramid.points[stage - 1], neighbors, cylindrical),
     )
+
+
+def _links(queries: Tensor, supports: Tensor, neighbors: Tensor, cylindrical: bool) -> Links | DenseLinks:
+    find = DenseLinks.find if queries.is_cuda else find_links
+    return find(queries, supports, neighbors, cylindrical=cylindrical)
 
 
 def _with_influence(around: Surroundings, block: nn.Module) -> Surroundings:

@@ -11,8 +11,9 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional as F
 
+from hybridreg.learned.dense_influence import DenseInfluence, DenseLinks
 from hybridreg.learned.group_norm import group_norm
-from hybridreg.learned.influence import Influence, Links, kernel_influence
+from hybridreg.learned.influence import Influence, Links
 from hybridreg.learned.kernel_points import cylindrical_kernel_points, kernel_points
 from hybridreg.learned.kpconv import KPConv
 from hybridreg.learned.max_pool import max_pool
@@ -27,12 +28,12 @@ class Surroundings:
     neighbors: Tensor  # (N, k) into the supports, pad M
     lengths: tuple[int, int]  # queries of the target, of the source
     support_lengths: tuple[int, int]
-    links: Links
-    influence: Influence | None = None  # where the layers share their kernel points
+    links: Links | DenseLinks
+    influence: Influence | DenseInfluence | None = None  # where the layers share their kernel points
 
-    def influence_of(self, conv: KPConv) -> Influence:
+    def influence_of(self, conv: KPConv) -> Influence | DenseInfluence:
         """Influences of the neighbours on a layer's kernel points."""
-        return self.influence or kernel_influence(self.links, conv.kernel, conv.sigma)
+        return self.influence or self.links.influence(conv.kernel, conv.sigma)
 
 
 class PointGroupNorm(nn.Module):

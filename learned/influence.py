@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 import torch
@@ -22,6 +23,18 @@ class Links:
     query: Tensor  # (E,) int64
     support: Tensor  # (E,) int64
     local: Tensor  # (4, E): support minus query in metres, and its squared length
+
+    def influence(self, kernel: Tensor, sigma: float) -> Influence:
+        """Of every neighbour on every kernel point (K, 3) metres: ``max(0, 1 - |y_j - q_i - x_k| / sigma)``."""
+        # |a - x|^2 as |a|^2 - 2 a.x + |x|^2: one product, no (E, K, 3) tensor. One kernel point at a time, so that
+        # what is looked at stays in the cache.
+        factors = torch.cat([-2.0 * kernel, torch.ones_like(kernel[:, :1])], dim=1)
+        constants = kernel.square().sum(1).tolist()
+        parts = [
+            _reached(self, factor, constant, sigma)
+            for factor, constant in zip(factors, constants, strict=True)
+        ]
+        return Influence(tuple(parts))
 
 
 def find_links(queries: Tensor, supports: Tensor, neighbors: Tensor, *, cylindrical: bool = False) -> Links:
@@ -50,6 +63,11 @@ class Influence:
 
     bags: tuple[Bags, ...]  # of each kernel point: (N, M)
 
+    def convolve(self, features: Tensor, weights: Tensor) -> Tensor:
+        """``sum_k H_k F W_k``: (M, C_in) and (K, C_in, C_out) to (N, C_out)."""
+        total: Tensor = _WeightedSums.apply(features, weights, self)
+        return total
+
     @cached_property
     def transposed(self) -> Bags:
         """All kernel points by support: (M, N * K), row ``query * K + kernel point``."""
@@ -65,26 +83,34 @@ class Influence:
         return replace(flipped, index=row)
 
 
-def kernel_influence(links: Links, kernel: Tensor, sigma: float) -> Influence:
-    """Linear influence ``max(0, 1 - |y_j - q_i - x_k| / sigma)`` of every neighbour on every kernel point.
+class _WeightedSums(torch.autograd.Function):
+    # Kernel point by kernel point.
 
-    Parameters
-    ----------
-    links
-        Of the queries.
-    kernel
-        (K, 3) metres.
-    sigma
-        Reach in metres.
-    """
-    # |a - x|^2 as |a|^2 - 2 a.x + |x|^2: one product, no (E, K, 3) tensor. One kernel point at a time, so that
-    # what is looked at stays in the cache.
-    factors = torch.cat([-2.0 * kernel, torch.ones_like(kernel[:, :1])], dim=1)
-    constants = kernel.square().sum(1).tolist()
-    parts = [
-        _reached(links, factor, constant, sigma) for factor, constant in zip(factors, constants, strict=True)
-    ]
-    return Influence(tuple(parts))
+    @staticmethod
+    def forward(ctx: Any, features: Tensor, weights: Tensor, influence: Influence) -> Tensor:
+        ctx.influence = influence
+        kept = []
+        out = features.new_zeros(len(influence.bags[0].offsets), weights.shape[2])
+        for bags, weight in zip(influence.bags, weights, strict=True):
+            gathered = bags.sum_detached(features)
+            out.addmm_(gathered, weight)
+            if ctx.needs_input_grad[1]:
+                kept.append(gathered)
+        ctx.save_for_backward(weights, *kept)
+        return out
+
+    @staticmethod
+    def backward(ctx: Any, gradient: Tensor) -> tuple[Tensor | None, Tensor | None, None]:
+        weights, *kept = ctx.saved_tensors
+        of_features = of_weights = None
+        if ctx.needs_input_grad[0]:
+            # all kernel points in one product and one sum
+            n_kernel, dim_in, dim_out = weights.shape
+            flat = gradient @ weights.view(n_kernel * dim_in, dim_out).t()
+            of_features = ctx.influence.transposed.sum_detached(flat.view(-1, dim_in))
+        if ctx.needs_input_grad[1]:
+            of_weights = torch.stack([gathered.t() @ gradient for gathered in kept])
+        return of_features, of_weights, None
 
 
 def _reached(links: Links, factor: Tensor, constant: float, sigma: float) -> Bags:

@@ -7,6 +7,8 @@ import os
 from datetime import timedelta
 from typing import TYPE_CHECKING, Literal
 
+import torch
+
 if TYPE_CHECKING:
     from lightning_fabric import Fabric
 
@@ -16,6 +18,8 @@ _PATIENCE = timedelta(hours=12)
 
 def start_processes(devices: int, accelerator: str, precision: Literal["32-true", "bf16-mixed"]) -> Fabric:
     """Join or start the processes of a run: those of ``torchrun`` where it started us, else ``devices`` of them.
+
+    More processes than graphics cards share them: a pair at a time leaves most of a card idle.
 
     Raises
     ------
@@ -29,13 +33,23 @@ def start_processes(devices: int, accelerator: str, precision: Literal["32-true"
         raise ImportError("training needs Lightning Fabric: pip install 'hybridreg[train]'") from error
     local = int(os.environ.get("LOCAL_WORLD_SIZE", devices))
     world = int(os.environ.get("WORLD_SIZE", local))
-    strategy: Strategy | str = DDPStrategy(timeout=_PATIENCE) if world > 1 else "auto"
+    cards = torch.cuda.device_count() if accelerator in ("auto", "cuda", "gpu") else 0
+    shared = _round_robin(local, cards) if 0 < cards < local else None
+    strategy: Strategy | str = "auto"
+    if shared:  # NCCL refuses two processes on one card
+        strategy = DDPStrategy(parallel_devices=shared, process_group_backend="gloo", timeout=_PATIENCE)
+    elif world > 1:
+        strategy = DDPStrategy(timeout=_PATIENCE)
     fabric = Fabric(
         accelerator=accelerator,
-        devices=local,
+        devices="auto" if shared else local,
         num_nodes=max(1, world // local),
         strategy=strategy,
         precision=precision,
     )
     fabric.launch()
     return fabric
+
+
+def _round_robin(processes: int, cards: int) -> list[torch.device]:
+    return [torch.device("cuda", place % cards) for place in range(processes)]

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 import torch
@@ -10,8 +12,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hybridreg.learned.blocks import PointGroupNorm, linear_on_joined, upsample
+from hybridreg.learned.dense_influence import DenseLinks
 from hybridreg.learned.group_norm import group_norm
-from hybridreg.learned.influence import find_links, kernel_influence
+from hybridreg.learned.influence import find_links
 from hybridreg.learned.kernel_points import cylindrical_kernel_points, kernel_points
 from hybridreg.learned.kpconv import KPConv, kernel_point_convolution
 from hybridreg.learned.max_pool import max_pool
@@ -32,7 +35,11 @@ def by_loops(queries, supports, neighbors, kernel, sigma, features, weights, bia
     return out + bias
 
 
-def test_equals_a_triple_loop() -> None:
+FORMS = pytest.mark.parametrize("find", [find_links, DenseLinks.find], ids=["sparse", "dense"])
+
+
+@FORMS
+def test_equals_a_triple_loop(find: Any) -> None:
     gen = torch.Generator().manual_seed(0)
     supports = torch.rand(20, 3, dtype=torch.float64, generator=gen)
     queries = torch.rand(11, 3, dtype=torch.float64, generator=gen)
@@ -42,15 +49,16 @@ def test_equals_a_triple_loop() -> None:
     weights = torch.randn(15, 4, 5, dtype=torch.float64, generator=gen)
     bias = torch.randn(5, dtype=torch.float64, generator=gen)
     kernel = torch.from_numpy(kernel_points(15, 0.8)).double()
-    influence = kernel_influence(find_links(queries, supports, neighbors), kernel, 0.4)
+    influence = find(queries, supports, neighbors).influence(kernel, 0.4)
     got = kernel_point_convolution(features, neighbors, influence, weights, bias)
     want = by_loops(queries, supports, neighbors, kernel, 0.4, features, weights, bias)
     assert torch.allclose(got, want, atol=1e-10, rtol=0)
     assert torch.equal(got[3], bias)
 
 
+@FORMS
 @pytest.mark.parametrize("sigma", [0.5, 1e-6])  # the second reaches nothing
-def test_gradients_reach_features_and_weights(sigma: float) -> None:
+def test_gradients_reach_features_and_weights(sigma: float, find: Any) -> None:
     gen = torch.Generator().manual_seed(1)
     supports = torch.rand(9, 3, dtype=torch.float64, generator=gen)
     queries = torch.rand(6, 3, dtype=torch.float64, generator=gen)
@@ -60,7 +68,7 @@ def test_gradients_reach_features_and_weights(sigma: float) -> None:
     weights = torch.randn(15, 3, 2, dtype=torch.float64, generator=gen, requires_grad=True)
     bias = torch.randn(2, dtype=torch.float64, generator=gen, requires_grad=True)
     kernel = torch.from_numpy(kernel_points(15, 0.8)).double()
-    influence = kernel_influence(find_links(queries, supports, neighbors), kernel, sigma)
+    influence = find(queries, supports, neighbors).influence(kernel, sigma)
 
     def convolve(f: torch.Tensor, w: torch.Tensor, b: torch.Tensor) -> torch.Tensor:
         return kernel_point_convolution(f, neighbors, influence, w, b)
@@ -145,7 +153,8 @@ def test_kernel_points_are_spread() -> None:
     assert np.array_equal(turned, kernel_points(15, 2.0, np.random.default_rng(3)))
 
 
-def test_cylindrical_features_do_not_feel_a_turn_about_the_vertical() -> None:
+@FORMS
+def test_cylindrical_features_do_not_feel_a_turn_about_the_vertical(find: Any) -> None:
     rng = np.random.default_rng(5)
     points = torch.from_numpy(rng.uniform(-3, 3, (60, 3)).astype(np.float32))
     turned = points @ torch.tensor([[0.6, 0.8, 0.0], [-0.8, 0.6, 0.0], [0.0, 0.0, 1.0]])
@@ -156,8 +165,8 @@ def test_cylindrical_features_do_not_feel_a_turn_about_the_vertical() -> None:
         torch.manual_seed(0)
         kernel = cylindrical_kernel_points(15, 2.0) if cylindrical else kernel_points(15, 2.0)
         conv = KPConv(4, 8, 1.0, kernel)
-        links = find_links(cloud, cloud, neighbors, cylindrical=cylindrical)
-        return conv(features, neighbors, kernel_influence(links, conv.kernel, conv.sigma)).detach()
+        links = find(cloud, cloud, neighbors, cylindrical=cylindrical)
+        return conv(features, neighbors, links.influence(conv.kernel, conv.sigma)).detach()
 
     assert torch.allclose(convolved(points, True), convolved(turned, True), atol=1e-5)
     assert not torch.allclose(convolved(points, False), convolved(turned, False), atol=1e-2)
