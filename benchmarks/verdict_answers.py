@@ -87,14 +87,11 @@ def _ranked(scene: Scene, found: list[Rival], truth: Array | None, metres: float
     poses = [(one, _right(one.T, truth, metres)) for one in found[:_RANKED]]
     poses = [pose for pose in poses if pose[1] is not None]
     if truth is not None and not any(right for _, right in poses):
-        # No recipe came to it, which must not speak against recipes that meet.
-        poses = [(one._replace(recipes=1), right) for one, right in poses]
         own = support.support(support.numbers(*support.seen(scene, truth)))
         poses = [*poses, (Rival(truth, own, matched=matched.share(scene, truth)), True)]
     told = told_apart(scene, [one._replace(closeness=0.0) for one, _ in poses])
     evidence = [
-        support.numbers(*support.seen(scene, one.T), one.recipes, matched.share(scene, one.T), one.closeness)
-        for one in told
+        support.numbers(*support.seen(scene, one.T), one.recipes, one.matched, one.closeness) for one in told
     ]
     return {"evidence": evidence, "right": [k for k, (_, right) in enumerate(poses) if right]}
 

@@ -15,7 +15,7 @@ from hybridreg.classical.nothing import NoOverlap
 from hybridreg.matches import Correspondences, Pose
 from hybridreg.scene import Scene
 from hybridreg.stage import Stage
-from hybridreg.verdict import rivals, support, weigh
+from hybridreg.verdict import matched, rivals, support, weigh
 from hybridreg.verdict.climb import climb
 from hybridreg.verdict.confidence import NEARLY, OK
 from hybridreg.verdict.hop import hop
@@ -132,7 +132,8 @@ def _polished(scene: Scene, found: list[Rival]) -> list[Rival]:
     if climbed.by_surfaces < first.by_surfaces + _NOISE:
         return found
     scene.shared(("polished", climbed.T.tobytes()), lambda: climbed)
-    return [first._replace(T=climbed.T, by_surfaces=climbed.by_surfaces), *others]
+    agree = matched.share(scene, climbed.T)
+    return [first._replace(T=climbed.T, by_surfaces=climbed.by_surfaces, matched=agree), *others]
 
 
 def _built(entry: Entry) -> Entry:

@@ -20,7 +20,7 @@ from hybridreg.cloud import PointCloud
 from hybridreg.extent import bounds
 from hybridreg.resources import n_workers
 from hybridreg.scene import Scene
-from hybridreg.verdict.settle import FEWEST, step_onto
+from hybridreg.verdict.settle import descend
 
 Array = NDArray[np.float64]
 
@@ -73,18 +73,8 @@ def closeness(scene: Scene, T_target_source: Array, every: int = 1) -> float:
 def settle_closely(scene: Scene, T_target_source: Array) -> Array:
     """Pose (4, 4) near by at which the source's points lie best on the target's surfaces as fine as these are."""
     source, target = _both(scene)
-    T = T_target_source
-    asked = source.asked[:_SETTLING]
-    for reach in _REACHES:
-        moved = se3.apply(T, asked)
-        distance, match = target.tree.query(moved, distance_upper_bound=reach)
-        near = np.isfinite(distance)
-        if np.count_nonzero(near) < FEWEST:
-            break
-        row = match[near]
-        width = max(_NOISE, _TRUST * reach)
-        T = step_onto(target.points[row], target.normals[row], moved[near], width) @ T
-    return T
+    steps = [(reach, max(_NOISE, _TRUST * reach)) for reach in _REACHES]
+    return descend(T_target_source, source.asked[:_SETTLING], target, steps)
 
 
 def _both(scene: Scene) -> tuple[Surfaces, Surfaces]:

@@ -41,7 +41,7 @@ def hop(scene: Scene, T_target_source: Array, rng: np.random.Generator) -> Rival
 
     def seen(T: Array) -> float:
         close = closeness(scene, T, _CLOSELY)
-        return support.of(source, target, T, spacing, _LOOKING) + support.beside(1, 0.0, close)
+        return support.of(source, target, T, spacing, _LOOKING) + support.beside(0.0, close)
 
     T, best = T_target_source, seen(T_target_source)
     for _, shift in zip(range(_HOPS), cycle(_SHIFTS), strict=False):

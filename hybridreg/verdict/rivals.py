@@ -53,7 +53,7 @@ class Rival(NamedTuple):
     @property
     def support(self) -> float:
         """Log-odds that the pose is right, were there no other."""
-        return self.by_surfaces + support.beside(self.recipes, self.matched, self.closeness)
+        return self.by_surfaces + support.beside(self.matched, self.closeness)
 
 
 def as_pose(found: Sequence[Rival]) -> Pose:

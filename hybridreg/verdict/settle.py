@@ -3,8 +3,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from typing import Protocol
+
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from hybridreg import se3
 from hybridreg.verdict.information import jacobian
@@ -19,7 +23,18 @@ _STEPS, _WIDE = (6.0, 4.0, 3.0, 2.0, 2.0), (12.0, 10.0, 8.0, 6.0, 5.0, 4.0, 3.0,
 # Width of the weights where the search is wide, per search distance.
 _TRUST = 0.25
 # Partners that a step takes, at least.
-FEWEST = 30
+_FEWEST = 30
+
+
+class Planes(Protocol):
+    """What points are laid on: points (n, 3) with normals (n, 3), and their KD-tree."""
+
+    @property
+    def points(self) -> Array: ...
+    @property
+    def normals(self) -> Array: ...
+    @property
+    def tree(self) -> cKDTree: ...
 
 
 def settle(
@@ -34,20 +49,33 @@ def settle(
     wide : bool
         Look for partners from twice as far, and trust far ones more at first.
     """
-    rows = source.settling[::every]
-    for step in _WIDE if wide else _STEPS:
-        moved = se3.apply(T, source.points[rows])
-        distance, match = target.tree.query(moved, distance_upper_bound=step * spacing)
+    steps = [
+        (step * spacing, spacing * (max(1.0, _TRUST * step) if wide else 1.0))
+        for step in (_WIDE if wide else _STEPS)
+    ]
+    return descend(T, source.points[source.settling[::every]], target, steps)
+
+
+def descend(T: Array, points: Array, surfaces: Planes, steps: Iterable[tuple[float, float]]) -> Array:
+    """Pose (4, 4) that steps of point-to-plane ICP reach from T, until too few `points` (n, 3) have a partner.
+
+    Parameters
+    ----------
+    steps : pairs of float
+        Farthest partner and width of the weights, metres, of each.
+    """
+    for reach, width in steps:
+        moved = se3.apply(T, points)
+        distance, match = surfaces.tree.query(moved, distance_upper_bound=reach)
         hit = np.isfinite(distance)
-        if np.count_nonzero(hit) < FEWEST:
+        if np.count_nonzero(hit) < _FEWEST:
             return T
-        match = np.asarray(match)[hit]
-        width = spacing * max(1.0, _TRUST * step) if wide else spacing
-        T = step_onto(target.points[match], target.normals[match], moved[hit], width) @ T
+        row = np.asarray(match)[hit]
+        T = _step_onto(surfaces.points[row], surfaces.normals[row], moved[hit], width) @ T
     return T
 
 
-def step_onto(planes: Array, normals: Array, points: Array, width: float) -> Array:
+def _step_onto(planes: Array, normals: Array, points: Array, width: float) -> Array:
     """Motion (4, 4) of one step of point-to-plane ICP that brings `points` (n, 3) nearer to `planes` through points
     (n, 3) with `normals` (n, 3).
 

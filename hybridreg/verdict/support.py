@@ -73,21 +73,16 @@ def terms(evidence: Mapping[str, float]) -> dict[str, float]:
         "relief": float(np.clip(relief, -_TOLD, _TOLD)),
         "log_relief_cells": float(np.log1p(cells)),
         "log_weakest": float(np.log10(evidence["weakest"] + _UNHELD)),
-        "log_recipes": float(np.log(evidence["recipes"])),
         "matched": evidence["matched"],
         "closeness": evidence["closeness"],
     }
 
 
-def beside(recipes: int, matched: float, closeness: float = 0.0) -> float:
-    """What it adds to a pose's support that so many recipes came to it, that this share of matches agrees, and that
-    it lies less closely than another (nats, at most nought)."""
+def beside(matched: float, closeness: float = 0.0) -> float:
+    """What it adds to a pose's support that this share of matches agrees, and that it lies less closely than another
+    (nats, at most nought)."""
     weights = model().weights
-    return (
-        weights["log_recipes"] * float(np.log(recipes))
-        + weights["matched"] * matched
-        + weights["closeness"] * closeness
-    )
+    return weights["matched"] * matched + weights["closeness"] * closeness
 
 
 def numbers(

@@ -36,11 +36,12 @@ print((peak_memory_mb() - before) * 2**20, forward_bytes(batch.pyramid, config))
 
 @pytest.mark.skipif(sys.platform != "linux", reason="peak memory is reset through /proc")
 def test_the_estimate_is_near_and_not_below() -> None:
-    # in a process of its own: this one holds freed memory that a forward pass would take first
-    printed = subprocess.run([sys.executable, "-c", _MEASURE], check=True, capture_output=True, text=True)
-    real, estimate = map(float, printed.stdout.split())
-    # which pages of the libraries a first pass touches differs from run to run by some tens of megabytes
-    assert real <= estimate <= 1.8 * real
+    # In processes of their own: this one holds freed memory that a forward pass would take first. Which pages of the
+    # libraries a first pass touches differs from run to run by some tens of megabytes.
+    command = [sys.executable, "-c", _MEASURE]
+    printed = [subprocess.run(command, check=True, capture_output=True, text=True).stdout for _ in range(3)]
+    real, estimate = np.array([line.split() for line in printed], dtype=float).T
+    assert real.max() <= estimate[0] <= 1.5 * np.median(real)
 
 
 def test_too_large_a_pair_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:

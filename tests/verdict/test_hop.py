@@ -55,7 +55,7 @@ def test_support_and_closeness_are_no_less_than_before(street: tuple[Scene, np.n
     end = hop(scene, start, np.random.default_rng(1))
     before, after = (
         support.of(source, target, T, views.spacing(scene), every=3)
-        + support.beside(1, 0.0, closeness(scene, T, 4))
+        + support.beside(0.0, closeness(scene, T, 4))
         for T in (start, end.T)
     )
     assert after >= before
