@@ -13,6 +13,7 @@ import torch
 from training_runs import WARM_UP, environment, log, options, state, write_recipe
 
 from hybridreg.learned.training import recipe_file
+from hybridreg.learned.training.processes import start_processes
 from hybridreg.learned.training.run import train
 
 
@@ -44,6 +45,35 @@ def test_two_gloo_processes_equal_one(content: dict[str, Any], cache: Path, tmp_
     for mine, theirs in zip(log(tmp_path / "one"), log(tmp_path / "two"), strict=True):
         numbers = {name: float(value) for name, value in mine.items() if value and name != "phase"}
         assert numbers == pytest.approx({name: float(theirs[name]) for name in numbers}, rel=1e-3, abs=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("cards", "expected"), [(0, None), (1, [0, 0, 0]), (2, [0, 1, 0]), (3, None), (4, None)]
+)
+def test_more_processes_than_cards_share_them(
+    cards: int, expected: list[int] | None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked: dict[str, Any] = {}
+
+    class Fabric:
+        def __init__(self, **given: Any) -> None:
+            asked.update(given)
+
+        def launch(self) -> None:
+            pass
+
+    monkeypatch.setattr("lightning_fabric.Fabric", Fabric)
+    monkeypatch.setattr(torch.cuda, "device_count", lambda: cards)
+    monkeypatch.setenv("LOCAL_WORLD_SIZE", "3")
+    monkeypatch.setenv("WORLD_SIZE", "3")
+    start_processes(1, "auto", "32-true")
+    if expected is None:
+        assert asked["strategy"].parallel_devices is None
+        assert asked["devices"] == 3
+    else:
+        assert [device.index for device in asked["strategy"].parallel_devices] == expected
+        assert asked["strategy"]._process_group_backend == "gloo"
+        assert asked["devices"] == "auto"
 
 
 def state_of_a_fresh_network(file: Path) -> dict[str, torch.Tensor]:
