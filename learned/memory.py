@@ -13,7 +13,7 @@ from hybridreg.learned.pyramid import Pyramid
 _FLOAT = 4
 _LINK = 84  # bytes a link: two indices, offset and length, and the tenth of the kernel points that it reaches
 _COPIES = 4  # of a stage's widest features alive at a time: input, output, and the steps between
-_CONSTANT = 2**26  # working buffers, which are of fixed size, and the libraries' own
+_SLACK = 2**26  # what the heap holds beside what is in use: 10 to 80 MB for one and the same pass
 
 
 def forward_bytes(pyramid: Pyramid, config: NetworkConfig) -> int:
@@ -22,7 +22,7 @@ def forward_bytes(pyramid: Pyramid, config: NetworkConfig) -> int:
     width = config.backbone.init_dim * 2
     encoder = max(_stage_bytes(pyramid, stage, width * 2**stage) for stage in stages)
     skips = sum(len(pyramid.points[stage]) * width * 2**stage * _FLOAT for stage in stages)
-    return _CONSTANT + max(encoder, _attention_bytes(pyramid, config)) + skips
+    return _SLACK + max(encoder, _attention_bytes(pyramid, config)) + skips
 
 
 def _stage_bytes(pyramid: Pyramid, stage: int, width: int) -> int:
