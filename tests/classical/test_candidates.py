@@ -121,6 +121,7 @@ def test_a_pose_that_several_entries_came_to_counts_as_many_recipes() -> None:
     apart = run(offers("one", TRUTH), offers("two", WRONG), enough=1.0)
     assert apart.recipes == 1
     doubt, belief = (weigh(sample_scene()[0], pose) for pose in (one, two))
+    assert belief.evidence["support"] == doubt.evidence["support"]  # recipes count in the confidence alone
     assert belief.confidence >= doubt.confidence
     assert belief.evidence["recipes"] == 2.0
 
