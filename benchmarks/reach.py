@@ -19,7 +19,7 @@ import numpy as np
 
 from benchmarks.calibration import answered, is_right
 from hybridreg.data import open_dataset
-from hybridreg.resolution import reach
+from hybridreg.extent import reach
 
 # Metres.
 BORDERS = (0.0, 6.0, 12.0, 25.0, np.inf)

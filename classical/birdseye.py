@@ -10,15 +10,14 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from hybridreg import se3
-from hybridreg.classical import ground
+from hybridreg import ground, se3
 from hybridreg.classical.climb import climb
 from hybridreg.classical.columns import FromAbove, from_above
-from hybridreg.classical.ground import Ground
 from hybridreg.classical.sweep import sweep
+from hybridreg.ground import Ground
 from hybridreg.matches import Correspondences, Pose
 from hybridreg.resolution import map_cell
-from hybridreg.scene import Level, Scene
+from hybridreg.scene import Level, Scene, centre
 from hybridreg.stage import Stage
 from hybridreg.verdict.confidence import NEARLY
 from hybridreg.verdict.rivals import BEYOND_DOUBT, Rival, best_first, distinct
@@ -44,7 +43,7 @@ _UPTURNED_DEG = 140.0
 class BirdsEye(Stage):
     """Search all yaws and shifts on the ground, for sensors whose tilt the ground tells.
 
-    Both clouds are levelled by their ground (`hybridreg.classical.ground`) and seen from above in layers of height.
+    Both clouds are levelled by their ground (`hybridreg.ground`) and seen from above in layers of height.
     Columns with points count for a pose where they meet, columns that one sensor looked through and the other
     filled count a little against it. The correlation is computed by FFT for every yaw on a coarse grid, its best
     peaks are improved on a fine one, and the best of these are settled on the surfaces and ranked by the verdict's
@@ -116,14 +115,15 @@ class BirdsEye(Stage):
         if not found:
             return []
         # Levelled by the best pose, both clouds lie truer than by their grounds.
-        T_level_source = _centred(T_level_target @ found[0].T, _centre(own.source))
+        T_level_source = _centred(T_level_target @ found[0].T, centre(own.source))
         again = self._slid(self._view(own, "source", T_level_source, voxel), target, voxel)
         return found + best_first(scene, [T_target_level @ M @ T_level_source for M in again])
 
     def _view(self, own: Scene, side: Side, T_level_cloud: Array, voxel: float) -> FromAbove:
         level = getattr(own, side)
         points = se3.apply(T_level_cloud, level.points)
-        eye = None if level.viewpoint is None else se3.apply(T_level_cloud, level.viewpoint[None])[0]
+        one_place = level.viewpoint is not None and level.viewpoint.ndim == 1
+        eye = se3.apply(T_level_cloud, level.viewpoint[None])[0] if one_place else None
         near = np.hypot(*points[:, :2].T) < _REACH * voxel
         return from_above(points[near], eye, tuple(voxel * edge for edge in self.layers), voxel)
 
@@ -167,14 +167,10 @@ class BirdsEye(Stage):
 _SIDES: tuple[Side, Side] = ("source", "target")
 
 
-def _centre(level: Level) -> Array:
-    return np.median(level.points, axis=0) if level.viewpoint is None else level.viewpoint
-
-
-def _centred(T_level_cloud: Array, centre: Array) -> Array:
+def _centred(T_level_cloud: Array, place: Array) -> Array:
     # The same turn and heights, with a place (3,) of the cloud on the axis that the maps turn about.
     R, t = T_level_cloud[:3, :3], T_level_cloud[:3, 3]
-    return se3.from_rt(R, t - (R @ centre + t) * [1.0, 1.0, 0.0])
+    return se3.from_rt(R, t - (R @ place + t) * [1.0, 1.0, 0.0])
 
 
 def _by_ground(own: Scene, scene: Scene) -> list[Array]:
@@ -205,4 +201,4 @@ def _assumed(points: Array, sign: float) -> Ground:
 
 
 def _level_frame(g: Ground, level: Level) -> Array:
-    return _centred(se3.from_rt(g.levelling, np.array([0.0, 0.0, -g.height])), _centre(level))
+    return _centred(se3.from_rt(g.levelling, np.array([0.0, 0.0, -g.height])), centre(level))

@@ -4,13 +4,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hybridreg import fitting, spec
+from hybridreg.classical import mistakes
 from hybridreg.classical.nothing import NoOverlap
 from hybridreg.matches import Correspondences, Pose
 from hybridreg.scene import Scene
@@ -79,12 +80,24 @@ class Candidates(Stage):
 
     def __call__(self, scene: Scene, matches: Correspondences, rng: np.random.Generator) -> Pose:
         found: list[Rival] = []
-        for found in self.stages(scene, matches, rng):
-            if found and weigh(scene, rivals.as_pose(found)).confidence >= self.enough:
+        confidence = 0.0
+        for found in self._worth_trying(scene).stages(scene, matches, rng):
+            confidence = weigh(scene, rivals.as_pose(found)).confidence if found else 0.0
+            if confidence >= self.enough:
                 break
-        if not found:
-            return Pose.unknown(len(matches))
-        return rivals.as_pose(found)
+        if confidence < OK:
+            scene.explanations.extend(mistakes.explanations(scene))
+        return rivals.as_pose(found) if found else Pose.unknown(len(matches))
+
+    def _worth_trying(self, scene: Scene) -> Candidates:
+        # Between clouds of one place in one unit the reach differs tenfold at most.
+        ratio = mistakes.size_ratio(scene.pair)
+        if mistakes.COMPARABLE < ratio < 1.0 / mistakes.COMPARABLE:
+            return self
+        scene.note(
+            f"one cloud reaches {max(ratio, 1.0 / ratio):.0f} times as far as the other: only one search was run"
+        )
+        return replace(self, of=self.of[:1])
 
     def stages(
         self, scene: Scene, matches: Correspondences, rng: np.random.Generator

@@ -9,11 +9,10 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from hybridreg.classical import ground
-from hybridreg.extent import radii
+from hybridreg import ground
+from hybridreg.extent import radii, reach
 from hybridreg.matches import Overlap
-from hybridreg.range_image import RangeImage
-from hybridreg.resolution import reach
+from hybridreg.range_image import RangeImage, RangeImages
 from hybridreg.scene import Level, Scene
 from hybridreg.stage import Stage
 
@@ -38,14 +37,14 @@ class Visibility(Stage):
 
     What it cannot tell, and does not pretend to: which way the other sensor faced (a narrow fan thins no
     direction of a full circle; the probability is that of a point which the fan is turned to), and what stood in
-    the way. A cloud without a viewpoint (its origin lies outside the cloud) says nothing
+    the way. A cloud without a viewpoint, or with several, says nothing
     about what its sensor could see, and the other cloud's points all count.
 
     Parameters
     ----------
     baseline : float or None
         How far apart the sensors may have stood, metres. None takes half of the shorter of the clouds' reaches
-        (`hybridreg.resolution.reach`).
+        (`hybridreg.extent.reach`).
     """
 
     baseline: float | None = None
@@ -64,8 +63,9 @@ class Visibility(Stage):
 def _reached(scene: Scene, side: Side, baseline: float) -> Array:
     other: Side = "target" if side == "source" else "source"
     level: Level = getattr(scene, side)
-    image = _image(scene, other)
-    if image is None or level.viewpoint is None:
+    image: RangeImage | RangeImages | None = getattr(scene.pair, other).range_image
+    # Sensors at several places together see nearly everything about them.
+    if not isinstance(image, RangeImage) or level.viewpoint is None or level.viewpoint.ndim > 1:
         return np.ones(len(level))
     farthest = float(np.quantile(image.ranges, 1.0 - _STRAYS))
     here, there = ground.find(scene, side), ground.find(scene, other)
@@ -73,14 +73,6 @@ def _reached(scene: Scene, side: Side, baseline: float) -> Array:
         return _within_range(level.points - level.viewpoint, farthest, baseline)
     up = here.above(level.points) - float(there.above(image.viewpoint[None])[0])
     return _within_view(level.points - level.viewpoint, up, here.up, image, there.up, farthest, baseline)
-
-
-def _image(scene: Scene, side: Side) -> RangeImage | None:
-    cloud = getattr(scene.pair, side)
-    viewpoint = cloud.viewpoint
-    if viewpoint is None:
-        return None
-    return scene.shared(("range image", side), lambda: RangeImage.of(cloud.points, viewpoint))
 
 
 def _within_range(ray: Array, farthest: float, baseline: float) -> Array:

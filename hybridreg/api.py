@@ -5,10 +5,11 @@ from __future__ import annotations
 
 from typing import Any, Literal
 
-from hybridreg.pair import Pair
+from hybridreg.pair import Gravity, Pair
 from hybridreg.pipeline import Pipeline
 from hybridreg.presets import DEFAULT
 from hybridreg.result import RegistrationResult
+from hybridreg.viewpoint import Given
 
 
 def register(
@@ -20,6 +21,9 @@ def register(
     voxel: float | None = None,
     seed: int = 0,
     nonfinite: Literal["raise", "drop"] = "raise",
+    source_viewpoint: Given = "auto",
+    target_viewpoint: Given = "auto",
+    gravity: Gravity = "known",
 ) -> RegistrationResult:
     """Align two point clouds with the default recipe, or with a preset of another name.
 
@@ -35,6 +39,11 @@ def register(
         Fixes every random choice.
     nonfinite : "raise" or "drop"
         What to do with points that are not finite; the count dropped stands in the result's notes.
+    source_viewpoint, target_viewpoint : "auto", "none", (3,), (N, 3), or ((k, 3), (N,))
+        Where each sensor stood, in the coordinates of its points; see `PointCloud.of`. Say it for maps, merged clouds
+        and vehicle frames: it lets free space speak.
+    gravity : "known" or "unknown"
+        "unknown" where one cloud may be turned over; else a pose that turns the world over is never "ok".
 
     Returns
     -------
@@ -51,4 +60,13 @@ def register(
         For a preset that does not exist.
     """
     pipeline = Pipeline.preset(preset, voxel=voxel)
-    return pipeline.run(Pair.of(source, target, image, nonfinite=nonfinite), seed=seed)
+    pair = Pair.of(
+        source,
+        target,
+        image,
+        nonfinite=nonfinite,
+        source_viewpoint=source_viewpoint,
+        target_viewpoint=target_viewpoint,
+        gravity=gravity,
+    )
+    return pipeline.run(pair, seed=seed)

@@ -3,7 +3,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+import os
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, Literal
 
@@ -11,6 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybridreg import extent, gate
+from hybridreg.io import read_viewpoint
+from hybridreg.range_image import RangeImage, RangeImages
+from hybridreg.viewpoint import Given, Seen, found, given
 
 Array = NDArray[np.float64]
 
@@ -32,16 +36,28 @@ class PointCloud:
         Whole kilometres taken off the coordinates that the user gave; zero for a cloud in its sensor's frame.
     dropped : int
         Non-finite points left out on request.
+    said : Seen or None
+        Where it was seen from, as a caller or a data set says; None puts a place to the test.
+    guess : (3,) float64 or None
+        The place that is tested then: what the file names, or the frame's origin.
     """
 
     points: Array
     sensor: str = ""
     offset: Array = field(default_factory=lambda: np.zeros(3))
     dropped: int = 0
+    said: Seen | None = None
+    guess: Array | None = None
 
     @classmethod
     def of(
-        cls, x: Any, *, name: str = "cloud", sensor: str = "", nonfinite: Literal["raise", "drop"] = "raise"
+        cls,
+        x: Any,
+        *,
+        name: str = "cloud",
+        sensor: str = "",
+        nonfinite: Literal["raise", "drop"] = "raise",
+        viewpoint: Given = "auto",
     ) -> PointCloud:
         """Check and convert anything that holds points: the one gate of the library.
 
@@ -53,6 +69,11 @@ class PointCloud:
             What error messages call the cloud.
         nonfinite : "raise" or "drop"
             What to do with points that are not finite.
+        viewpoint : "auto", "none", (3,), (N, 3), or ((k, 3), (N,))
+            Where the sensor stood, in the coordinates of the points: one place, one for each point, or places and the
+            row of each point's. "none" is honest for a map, a CAD model or a merged cloud whose sensors are not known:
+            free space is not tested then. "auto" takes what the file says, or tests whether a sensor may have stood
+            at the origin (`hybridreg.viewpoint`).
 
         Raises
         ------
@@ -61,14 +82,24 @@ class PointCloud:
         """
         if isinstance(x, PointCloud):
             gate.check(x.points, name)
-            return x
+            said = given(viewpoint, len(x), name)
+            return x if said is None else replace(x, said=said.less(x.offset))
         raw = gate.coordinates(x, name)
-        kept = gate.finite(raw, name, drop=nonfinite == "drop")
+        place = read_viewpoint(x) if isinstance(x, (str, os.PathLike)) else None
+        kept, rows = gate.finite(raw, name, drop=nonfinite == "drop")
+        said = given(viewpoint, len(raw), name)
         offset = _whole_kilometres(kept)
         points = kept - offset
         gate.check(points, name)
         points.setflags(write=False)
-        return cls(points=points, sensor=sensor, offset=offset, dropped=len(raw) - len(kept))
+        return cls(
+            points=points,
+            sensor=sensor,
+            offset=offset,
+            dropped=len(raw) - len(kept),
+            said=None if said is None else said.of(rows).less(offset),
+            guess=None if place is None else place - offset,
+        )
 
     def __len__(self) -> int:
         return len(self.points)
@@ -84,12 +115,25 @@ class PointCloud:
         return extent.radii(self.points)
 
     @cached_property
+    def seen(self) -> Seen:
+        """Where the cloud was seen from, and how that is known: as said, or as the test of the origin tells."""
+        return found(self.points, self.guess) if self.said is None else self.said
+
+    @property
     def viewpoint(self) -> Array | None:
-        """Where the sensor stood, (3,): the origin of its frame, or None where that lies far from the points."""
-        low, high = self.bounds
-        margin = 0.1 * float(np.linalg.norm(high - low))
-        inside = bool(np.all(low - margin <= 0.0) and np.all(high + margin >= 0.0))
-        return np.zeros(3) if inside else None
+        """Where the sensor stood: (3,), (k, 3) of several places, or None where it is not known; `offset` taken off."""
+        places = self.seen.places
+        return None if len(places) == 0 else places[0] if len(places) == 1 else places
+
+    @cached_property
+    def range_image(self) -> RangeImage | RangeImages | None:
+        """What the sensor saw in each direction; None where its place is not known."""
+        places, of_point, _ = self.seen
+        if len(places) == 0:
+            return None
+        if of_point is None:
+            return RangeImage.of(self.points, places[0])
+        return RangeImages.of(self.points, places, of_point)
 
 
 def _whole_kilometres(points: Array) -> Array:

@@ -10,6 +10,9 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
+# Of the points, whose distance from the cloud's middle is its reach: stray returns lie anywhere.
+_MOST = 0.9
+
 
 def bounds(points: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any]]:
     """Lower and upper corner (d,) of the box around `points` (N, d)."""
@@ -28,3 +31,8 @@ def radii(points: Array) -> Array:
 def share_within(radii: Array, share: float) -> float:
     """Radius within which this share of the points lies, from their `radii`."""
     return float(radii[round(share * (len(radii) - 1))])
+
+
+def reach(radii: Array) -> float:
+    """Reach of a cloud, metres, from its `radii`."""
+    return share_within(radii, _MOST)

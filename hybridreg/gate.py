@@ -63,11 +63,12 @@ def _held_by(x: Any) -> Any:
     return x.points if hasattr(x, "points") else x  # Open3D legacy cloud, or anything shaped like one
 
 
-def finite(points: Array, name: str, *, drop: bool) -> Array:
-    """Refuse rows with a NaN or an infinity, or leave them out where that was asked for."""
+def finite(points: Array, name: str, *, drop: bool) -> tuple[Array, NDArray[np.bool_] | None]:
+    """Refuse rows with a NaN or an infinity, or leave them out where that was asked for; which rows (N,) are left, None
+    for all."""
     every = np.isfinite(points)
     if every.all():
-        return points
+        return points, None
     good = every.all(axis=1)
     n_bad = len(points) - int(good.sum())
     if not drop:
@@ -75,7 +76,7 @@ def finite(points: Array, name: str, *, drop: bool) -> Array:
             f"{name}: {n_bad} of {len(points)} points are not finite (the first is row {int(np.argmin(good))}); "
             'remove them or pass nonfinite="drop"'
         )
-    return points[good]
+    return points[good], good
 
 
 def check(points: Array, name: str) -> None:

@@ -34,7 +34,8 @@ def tree(scene: Scene, side: Side) -> cKDTree:
 def estimate(points: Array, viewpoint: Array | None, k: int = 20) -> Array:
     """Normals (n, 3) of `points` (n, 3): the direction of least spread among the k nearest neighbours.
 
-    Of unit length, towards the sensor at `viewpoint` (3,), or upwards where its place is not known. The wheel of
+    Of unit length, towards the sensor at `viewpoint` (3,), the nearest of several (k, 3), or upwards where its place is
+    not known. The wheel of
     small_gicp computes them four times as fast as numpy does.
     """
     import small_gicp
@@ -47,6 +48,10 @@ def estimate(points: Array, viewpoint: Array | None, k: int = 20) -> Array:
     tree = small_gicp.KdTree(cloud, num_threads=n_workers())
     small_gicp.estimate_normals(cloud, tree, times * k, n_workers())
     found: Array = cloud.normals()[: len(points), :3]
-    towards = np.array([0.0, 0.0, 1.0]) if viewpoint is None else viewpoint - points
+    towards = np.array([0.0, 0.0, 1.0]) if viewpoint is None else _nearest(viewpoint, points) - points
     away = np.einsum("ni,ni->n", found, np.broadcast_to(towards, found.shape)) < 0.0
     return np.where(away[:, None], -found, found)
+
+
+def _nearest(places: Array, points: Array) -> Array:
+    return places if places.ndim == 1 else places[cKDTree(places).query(points)[1]]

@@ -13,8 +13,10 @@ from numpy.typing import NDArray
 
 from hybridreg import se3
 from hybridreg.cloud import PointCloud
+from hybridreg.viewpoint import Given
 
 Array = NDArray[np.float64]
+Gravity = Literal["known", "unknown"]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -31,6 +33,9 @@ class Pair:
         Seeds the pair's random generator together with the run's seed.
     meta : mapping
         Free facts for reports. Never the pose.
+    gravity : "known" or "unknown"
+        "known": both clouds stand on the same side of their ground, so that a pose which turns the world over is wrong.
+        "unknown": they may not (an object that was turned over between two scans).
     """
 
     source: PointCloud
@@ -38,6 +43,7 @@ class Pair:
     image: NDArray[np.uint8] | None = None
     id: str = "pair"
     meta: Mapping[str, Any] = field(default_factory=dict)
+    gravity: Gravity = "known"
 
     @classmethod
     def of(
@@ -49,14 +55,20 @@ class Pair:
         id: str = "pair",
         meta: Mapping[str, Any] | None = None,
         nonfinite: Literal["raise", "drop"] = "raise",
+        source_viewpoint: Given = "auto",
+        target_viewpoint: Given = "auto",
+        gravity: Gravity = "known",
     ) -> Pair:
         """Build a pair from anything `PointCloud.of` takes, and a path or an array for the image."""
+        if gravity not in ("known", "unknown"):
+            raise ValueError(f'gravity={gravity!r} must be "known" or "unknown"')
         return cls(
-            source=PointCloud.of(source, name="source", nonfinite=nonfinite),
-            target=PointCloud.of(target, name="target", nonfinite=nonfinite),
+            source=PointCloud.of(source, name="source", nonfinite=nonfinite, viewpoint=source_viewpoint),
+            target=PointCloud.of(target, name="target", nonfinite=nonfinite, viewpoint=target_viewpoint),
             image=None if image is None else _image(image),
             id=id,
             meta=dict(meta or {}),
+            gravity=gravity,
         )
 
 

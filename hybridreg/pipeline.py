@@ -13,9 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybridreg import fitting, presets, shipped_weights, spec
+from hybridreg.cloud import PointCloud
 from hybridreg.frames import lower_matches, raise_matches, raise_pose
 from hybridreg.matches import Correspondences, Overlap, Pose
 from hybridreg.pair import Pair
+from hybridreg.resolution import tolerance
 from hybridreg.resources import peak_memory_mb, reset_peak_memory, stopwatch
 from hybridreg.result import RegistrationResult
 from hybridreg.scene import Scene
@@ -153,6 +155,7 @@ class Pipeline(Stage):
             peak_memory_mb=peak_memory_mb(),
             seed=seed,
             spec=self.to_spec(),
+            tolerance=tolerance(pair.source, pair.target),
         )
 
     def trace(self, pair: Pair, *, seed: int = 0, matches: Any = None) -> Trace:
@@ -167,6 +170,8 @@ class Pipeline(Stage):
             scene = self.downsample(pair)
         fitting.check_scene(scene)
         for name, cloud in (("source", pair.source), ("target", pair.target)):
+            if len(cloud.seen.places) != 1:
+                scene.note(f"the {name} was seen from {_places(cloud)}")
             if cloud.dropped:
                 scene.note(f"{cloud.dropped} points of the {name} were not finite and were dropped")
         with stopwatch(seconds, "overlap"):
@@ -183,6 +188,13 @@ class Pipeline(Stage):
         if not len(found):  # an estimator that runs recipes of its own may have matched
             found = of_most(scene, refined.T)
         return Trace(scene, overlap, found, estimated, refined, seconds)
+
+
+def _places(cloud: PointCloud) -> str:
+    several = len(cloud.seen.places)
+    if several:
+        return f"{several} places, {cloud.seen.words}"
+    return f"no known place ({cloud.seen.words}); if you know it, say so: a viewpoint lets free space speak"
 
 
 def _proper(pose: Pose) -> Pose:

@@ -15,6 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from hybridreg.extent import radii
+from hybridreg.extent import reach as reach_of
+
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
@@ -28,6 +31,10 @@ _BITS = 12  # of a cell's index along one axis
 # Steeper than this a surface is seen edge-on, degrees: a ray beside the point that goes on may graze the same surface
 # far behind it. Most ground is seen so.
 _EDGE_ON_DEG = 75.0
+# Of a cloud's reach, as in `hybridreg.resolution`.
+_CELLS_ALONG_REACH = 60.0
+# Places from which a cloud was seen, at most: each has an image of its own.
+_MOST_PLACES = 8
 # Two returns of one cell whose ranges differ by less than this share lie on one surface.
 _ONE_SURFACE = 0.1
 
@@ -76,9 +83,10 @@ class RangeImage:
             raise ValueError("range image: every point lies at the viewpoint")
         reach = reach[apart]
         directions = ray[apart] / reach[:, None]
-        directions, reach = _thin(directions, reach, _FINEST)
-        resolution = angular_resolution(directions)
-        if resolution > 2.0 * _FINEST:
+        finest = _finest(points[apart], reach)
+        directions, reach = _thin(directions, reach, finest)
+        resolution = angular_resolution(directions, finest)
+        if resolution > 2.0 * finest:
             directions, reach = _thin(directions, reach, 0.5 * resolution)
         tree = cKDTree(directions, balanced_tree=False, compact_nodes=False)
         return cls(np.asarray(viewpoint, dtype=np.float64), directions, reach, resolution, tree)
@@ -124,13 +132,48 @@ class RangeImage:
         return np.where(asked.any(axis=1), state, Seen.UNSEEN).astype(np.int8)
 
 
-def angular_resolution(directions: Array) -> float:
+@dataclass(frozen=True, eq=False)
+class RangeImages:
+    """Range images of a cloud that was seen from several places, each of the points seen from there."""
+
+    images: tuple[RangeImage, ...]
+
+    @classmethod
+    def of(cls, points: Array, places: Array, of_point: Integers) -> RangeImages:
+        """Images of `points` (N, 3) about those `places` (k, 3) from which most were seen.
+
+        `of_point` (N,) is the row of each point's place.
+        """
+        counts = np.bincount(of_point, minlength=len(places))
+        most = [int(k) for k in np.argsort(-counts, kind="stable")[:_MOST_PLACES] if counts[k] > 0]
+        return cls(tuple(RangeImage.of(points[of_point == k], places[k]) for k in most))
+
+    def look(
+        self, points: Array, normals: Array | None = None, *, margin: float, reach: float = np.inf, k: int = 4
+    ) -> NDArray[np.int8]:
+        """As of one image: seen or looked through where any sensor did, hidden only where none did."""
+        states = np.stack(
+            [image.look(points, normals, margin=margin, reach=reach, k=k) for image in self.images]
+        )
+        told = [(states == state).any(axis=0) for state in (Seen.SEEN, Seen.FREE, Seen.HIDDEN)]
+        return np.select(told, [Seen.SEEN, Seen.FREE, Seen.HIDDEN], Seen.UNSEEN).astype(np.int8)
+
+
+def _finest(points: Array, ranges: Array) -> float:
+    # Half of the cells into which the cloud is cut to be compared, as they are seen: of a small thing seen from near by
+    # far finer than of a street.
+    some = points[:: max(1, len(points) // 5_000)]
+    cell = reach_of(radii(some)) / _CELLS_ALONG_REACH
+    return float(np.clip(0.5 * cell / float(np.median(ranges)), 2.0 / (1 << _BITS) * 1.01, _FINEST))
+
+
+def angular_resolution(directions: Array, finest: float = _FINEST) -> float:
     """Angle in radians at which cells on the sphere are as wide as the gaps between returns (n, 3).
 
     While cells are finer than the gaps between rings, doubling them doubles the part of the sky that counts as
     seen; once they are wider it hardly grows. The doubling stops there.
     """
-    angle = _FINEST
+    angle = finest
     cells = np.unique(_cells(directions, angle))
     while angle < _COARSEST:
         coarser = np.unique(_merged(cells))

@@ -3,21 +3,23 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
 from hybridreg.cloud import PointCloud
-from hybridreg.extent import share_within
+from hybridreg.extent import reach, share_within
 
 Array = NDArray[np.float64]
 
 # Cells along the reach. On vehicle LiDAR (reach 25-50 m) this gives 0.4-0.8 m, in a room 5 cm.
 _CELLS_ALONG_REACH = 60.0
-# Of the points, whose distance from the cloud's middle is its reach: stray returns lie anywhere.
-_MOST = 0.9
 # Cell of a map seen from above: metres outdoors; in a room, so many along the distance within which nearly all points
 # lie.
 _MAP_CELL, _CELLS_ALONG_MAP, _NEARLY_ALL = 0.5, 60.0, 0.99
+# What counts as right is no more than this share of the shorter reach: half a metre says nothing about a small thing.
+_OF_REACH = 0.04
 
 
 def default_voxel(source: PointCloud, target: PointCloud) -> float:
@@ -37,11 +39,23 @@ def map_cell(source: PointCloud, target: PointCloud) -> float:
     return min(_MAP_CELL, float(f"{longer / _CELLS_ALONG_MAP:.2g}")) or _MAP_CELL
 
 
+class Tolerance(NamedTuple):
+    """How near to the true pose counts as right: `degrees` of its turn, and `metres` at the middle of the source."""
+
+    degrees: float
+    metres: float
+
+
+# The paper's own, for vehicle sensors (arXiv 2509.06456, section 4.1).
+VEHICLES = Tolerance(2.0, 0.5)
+
+
+def tolerance(source: PointCloud, target: PointCloud) -> Tolerance:
+    """2 degrees and half a metre for vehicle sensors; less for smaller scenes, 4 % of the shorter reach."""
+    shorter = min(reach(source.radii), reach(target.radii)) or _longest(source)
+    return VEHICLES._replace(metres=min(VEHICLES.metres, float(f"{_OF_REACH * shorter:.2g}")))
+
+
 def _longest(cloud: PointCloud) -> float:
     low, high = cloud.bounds
     return float((high - low).max())
-
-
-def reach(radii: Array) -> float:
-    """Reach of a cloud, metres, from its `radii`."""
-    return share_within(radii, _MOST)

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from hybridreg.fitness import Overlay
 from hybridreg.matches import Correspondences
+from hybridreg.resolution import VEHICLES, Tolerance
 
 Array = NDArray[np.float64]
 Word = Literal["ok", "doubtful", "failed"]
@@ -34,6 +35,7 @@ class RegistrationResult:
         is orthogonal with determinant +1. `T_target_source` is another name for it.
     verdict : "ok", "doubtful" or "failed"
     confidence : float in [0, 1]
+        Estimated probability that the pose is right, to `tolerance`.
     reasons : tuple of str
         Why the verdict is what it is, in words.
     overlay : Overlay
@@ -57,6 +59,8 @@ class RegistrationResult:
     seed : int
     spec : mapping
         The pipeline that made it, as `Pipeline.save` writes it.
+    tolerance : Tolerance
+        What "right" means to `confidence`: within so many degrees, and so many metres at the middle of the source.
     """
 
     transformation: Array
@@ -73,6 +77,7 @@ class RegistrationResult:
     peak_memory_mb: float | None
     seed: int
     spec: Mapping[str, Any] = field(repr=False)
+    tolerance: Tolerance = VEHICLES
 
     @property
     def T_target_source(self) -> Array:
@@ -132,6 +137,8 @@ class RegistrationResult:
 def _plain(value: Any) -> Any:
     if isinstance(value, np.ndarray):
         return value.tolist()
+    if isinstance(value, Tolerance):
+        return value._asdict()
     if isinstance(value, Mapping):
         return {key: _plain(item) for key, item in value.items()}
     if isinstance(value, (tuple, list)):

@@ -27,7 +27,7 @@ class Level:
         In the frame of the pair's cloud (its offset taken off), metres.
     spacing : float
         Typical distance of neighbours, metres: the voxel where a grid made the level.
-    viewpoint : (3,) float64 or None
+    viewpoint : (3,), (k, 3) of several places, or None
         Where the sensor stood.
     """
 
@@ -37,6 +37,14 @@ class Level:
 
     def __len__(self) -> int:
         return len(self.points)
+
+
+def centre(level: Level) -> Array:
+    """Where the cloud was seen from, (3,): the middle of several places; of the points where none is known."""
+    if level.viewpoint is None:
+        middle: Array = np.median(level.points, axis=0)
+        return middle
+    return level.viewpoint if level.viewpoint.ndim == 1 else level.viewpoint.mean(axis=0)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -49,6 +57,8 @@ class Scene:
     source, target : Level
     notes : list of str
         What a stage wants the user to read in the result: a default it chose, a cap that bit.
+    explanations : list of str
+        Mistakes of the user's under which the clouds would fit: what the verdict's reasons begin with.
     matches : list of Correspondences
         What the run's matchers found so far, each with one match at least.
     """
@@ -57,6 +67,7 @@ class Scene:
     source: Level
     target: Level
     notes: list[str] = field(default_factory=list)
+    explanations: list[str] = field(default_factory=list)
     matches: list[Correspondences] = field(default_factory=list)
     _shared: dict[Hashable, Any] = field(default_factory=dict, repr=False)
 

@@ -22,6 +22,26 @@ Protocols = Annotated[
 Workers = Annotated[int, typer.Option(min=1, help="Processes, each with one thread.")]
 Overwrite = Annotated[bool, typer.Option("--overwrite", help="Run anew what the folder already holds.")]
 
+Viewpoint = Annotated[
+    str,
+    typer.Option(metavar="x,y,z|none|auto", help="Where its sensor stood, metres in the cloud's own frame."),
+]
+
+
+def viewpoint(text: str, option: str) -> Any:
+    """What `PointCloud.of` takes, of `x,y,z`, `none` or `auto`."""
+    if text in ("auto", "none"):
+        return text
+    try:
+        place = tuple(float(part) for part in text.split(","))
+    except ValueError:
+        place = ()
+    if len(place) != 3:
+        raise ValueError(
+            f"{option} {text}: give three numbers in metres, such as {option} 0,0,1.8, or none, or auto"
+        )
+    return place
+
 
 def changes_of(
     preset: str | None, pipeline: Path | None, settings: list[str] | None, voxel: float | None

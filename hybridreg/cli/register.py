@@ -23,6 +23,13 @@ class NonFinite(str, Enum):
     drop = "drop"
 
 
+class Up(str, Enum):
+    """Whether both clouds stand on the same side of their ground."""
+
+    known = "known"
+    unknown = "unknown"
+
+
 @plainly
 def command(
     source: Annotated[Path, typer.Argument(help="The cloud that moves: ply, pcd, npy, npz, bin, las, txt.")],
@@ -35,13 +42,24 @@ def command(
     seed: options.Seed = 0,
     out: Annotated[Path | None, typer.Option(help="Folder for pose, result, page and picture.")] = None,
     nonfinite: Annotated[NonFinite, typer.Option(help="Points that are not finite.")] = NonFinite.refuse,
+    source_viewpoint: options.Viewpoint = "auto",
+    target_viewpoint: options.Viewpoint = "auto",
+    gravity: Annotated[Up, typer.Option(help="'unknown' where one cloud may be upside down.")] = Up.known,
 ) -> None:
     """Align two point clouds; print the pose, whether to believe it, and the seconds of each stage."""
     from hybridreg.changes import build
     from hybridreg.pair import Pair
 
     method = build(options.changes_of(preset, pipeline, settings, voxel))
-    pair = Pair.of(source, target, image, nonfinite="drop" if nonfinite is NonFinite.drop else "raise")
+    pair = Pair.of(
+        source,
+        target,
+        image,
+        nonfinite="drop" if nonfinite is NonFinite.drop else "raise",
+        source_viewpoint=options.viewpoint(source_viewpoint, "--source-viewpoint"),
+        target_viewpoint=options.viewpoint(target_viewpoint, "--target-viewpoint"),
+        gravity="unknown" if gravity is Up.unknown else "known",
+    )
     result = method.run(pair, seed=seed)
     show(result)
     if out is not None:

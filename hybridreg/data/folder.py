@@ -25,7 +25,9 @@ class PairFolder(Dataset):
     ----------
     root : path
         `root/<id>/source.*` and `target.*` are clouds of any format that `hybridreg.io` reads, `image.*` is a
-        photograph, and `meta.json` holds `T_target_source`, 4x4, row by row, metres.
+        photograph, and `meta.json` holds `T_target_source`, 4x4, row by row, metres; perhaps `source_viewpoint` and
+        `target_viewpoint`: [x, y, z] where the sensor stood in its cloud's frame, "none", or
+        {"places": [[x, y, z], ...], "of_point": [row of each point's place, ...]}.
 
     Raises
     ------
@@ -80,10 +82,26 @@ def load_pair(folder: Path) -> LabelledPair:
     files = _files(folder)
     meta = _read_meta(files["meta"])
     facts = {key: meta[key] for key in _FREE_FACTS if key in meta}
-    pair = Pair.of(files["source"], files["target"], files.get("image"), id=folder.name, meta=facts)
+    pair = Pair.of(
+        files["source"],
+        files["target"],
+        files.get("image"),
+        id=folder.name,
+        meta=facts,
+        source_viewpoint=_viewpoint(meta, "source"),
+        target_viewpoint=_viewpoint(meta, "target"),
+    )
     truth = se3.check(meta["T_target_source"], f"{files['meta']}: T_target_source")
     overlap = value_of(float | None, meta.get("overlap"), f"{files['meta']}: overlap")
     return LabelledPair(pair=pair, T_target_source=truth, overlap=overlap)
+
+
+def _viewpoint(meta: dict[str, Any], side: str) -> Any:
+    # "none", one place, or places and the row of each point's.
+    place = meta.get(f"{side}_viewpoint", "auto")
+    if isinstance(place, dict):
+        return place.get("places"), place.get("of_point")
+    return place
 
 
 def _is_pair(folder: Path) -> bool:

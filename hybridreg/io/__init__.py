@@ -3,7 +3,7 @@
 
 from hybridreg.io.atomic import atomic_path, write_bytes, write_text
 from hybridreg.io.image import as_image, read_image
-from hybridreg.io.points import read_points
+from hybridreg.io.points import read_points, read_viewpoint
 from hybridreg.io.write import write_json, write_matrix, write_points
 
 __all__ = [
@@ -11,6 +11,7 @@ __all__ = [
     "atomic_path",
     "read_image",
     "read_points",
+    "read_viewpoint",
     "write_bytes",
     "write_json",
     "write_matrix",

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import isfinite
 
 from hybridreg.io.faults import fault, shorten
 from hybridreg.io.records import whole_number
@@ -30,6 +31,9 @@ class PcdHeader:
     points: int
     encoding: str
     body: int  # the first byte after the header
+    viewpoint: (
+        tuple[float, float, float] | None
+    )  # where the sensor stood; None where the header says nothing of it
 
     @property
     def sizes(self) -> tuple[int, ...]:
@@ -56,6 +60,7 @@ def parse_pcd_header(data: bytes, name: str) -> PcdHeader:
         points=_points(entries, name),
         encoding=encoding,
         body=body,
+        viewpoint=_viewpoint(entries.get("VIEWPOINT", []), name),
     )
 
 
@@ -95,6 +100,20 @@ def _count(text: str, name: str) -> int:
     if count > _LARGEST_COUNT:
         raise fault(name, f"a field has the COUNT {count}, the largest descriptors have some thousands")
     return count
+
+
+def _viewpoint(values: list[str], name: str) -> tuple[float, float, float] | None:
+    # Translation and quaternion (w x y z) of the sensor in the frame of the points. Nearly every writer fills in the
+    # origin for want of better, so that says nothing.
+    try:
+        x, y, z, *turn = (float(value) for value in values)
+    except ValueError:
+        if not values:
+            return None
+        raise fault(name, f"its VIEWPOINT is {shorten(' '.join(values))}, not seven numbers") from None
+    if len(turn) not in (0, 4) or not all(isfinite(value) for value in (x, y, z, *turn)):
+        raise fault(name, f"its VIEWPOINT is {shorten(' '.join(values))}, not seven finite numbers")
+    return None if (x, y, z) == (0.0, 0.0, 0.0) else (x, y, z)
 
 
 def _points(entries: dict[str, list[str]], name: str) -> int:

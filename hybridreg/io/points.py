@@ -16,10 +16,13 @@ from hybridreg.io.files import check_file, read_whole
 from hybridreg.io.las import parse_las
 from hybridreg.io.npy import parse_npy
 from hybridreg.io.npz import parse_npz
-from hybridreg.io.pcd import parse_pcd
+from hybridreg.io.pcd import parse_pcd, pcd_viewpoint
 from hybridreg.io.ply import parse_ply
 from hybridreg.io.signatures import kind_of
 from hybridreg.io.text import parse_text
+
+# Bytes in which the header of a PCD file ends.
+_HEADER = 65_536
 
 Parser = Callable[[bytes, str], NDArray[np.float64]]
 
@@ -71,6 +74,20 @@ def read_points(path: str | os.PathLike[str]) -> NDArray[np.float64]:
     check_file(path)
     _parser_for(str(path))  # before the reading, which may be long
     return parse_points(read_whole(path), str(path))
+
+
+def read_viewpoint(path: str | os.PathLike[str]) -> NDArray[np.float64] | None:
+    """Where the sensor stood, (3,) in the file's own frame and unit, as a `.pcd` file may tell; else None.
+
+    Raises
+    ------
+    ValueError
+        A PCD header that cannot be read.
+    """
+    if _suffix(os.fspath(path)) != ".pcd":
+        return None
+    with open(path, "rb") as file:
+        return pcd_viewpoint(file.read(_HEADER), os.fspath(path))
 
 
 def parse_points(data: bytes, name: str) -> NDArray[np.float64]:

@@ -18,6 +18,7 @@ from hybridreg import se3
 from hybridreg.range_image import Seen
 from hybridreg.verdict.axes import faced, main_axes
 from hybridreg.verdict.relief import Alike, alike
+from hybridreg.verdict.upright import overturned
 from hybridreg.verdict.views import View
 
 Array = NDArray[np.float64]
@@ -66,6 +67,8 @@ class Agreement:
         looked through; both clouds together
     relief : Alike
         Whether the ground rises and falls alike.
+    overturned : bool
+        The world is turned over, or a sensor stands under the other's ground.
     """
 
     source: OneWay
@@ -75,6 +78,7 @@ class Agreement:
     agreed: Array
     through: Array
     relief: Alike
+    overturned: bool
 
     @property
     def shares(self) -> Array:
@@ -113,6 +117,7 @@ def compare(source: View, target: View, T_target_source: Array, spacing: float, 
         agreed=every * agreed,
         through=every * through,
         relief=alike(source.relief, target.relief, T_target_source, every),
+        overturned=overturned(source, target, T_target_source),
     )
 
 

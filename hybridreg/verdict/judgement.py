@@ -13,9 +13,11 @@ from hybridreg.matches import Correspondences, Pose
 from hybridreg.scene import Scene
 from hybridreg.verdict import matched, rivals, support, views
 from hybridreg.verdict.agreement import Agreement, OneWay
+from hybridreg.verdict.closeness import closeness
 from hybridreg.verdict.confidence import NEARLY, NO_RIVAL, Word, confidence, word
 from hybridreg.verdict.information import Information
 from hybridreg.verdict.rivals import Rival
+from hybridreg.verdict.similarity import Size, size
 from hybridreg.verdict.views import View
 from hybridreg.verdict.words import reasons
 
@@ -84,8 +86,9 @@ def judge(scene: Scene, pose: Pose, matches: Correspondences) -> Judgement:
     return Judgement(
         verdict=word(probability),
         confidence=probability,
-        reasons=reasons(
-            evidence, weighed.agreement, weighed.held, found=pose.found, images=_images(*views.views(scene))
+        reasons=(
+            *scene.explanations,
+            *reasons(evidence, weighed.agreement, weighed.held, found=pose.found, unseen=_unseen(scene)),
         ),
         evidence=evidence,
         overlay=Overlay(scene.pair.source.points, scene.pair.target.points, pose.T, 2.0 * scene.spacing),
@@ -118,10 +121,19 @@ def _weigh(scene: Scene, pose: Pose) -> Weighed:
     )
     own, *found = rivals.told_apart(scene, [own, *found])
     found.sort(key=lambda rival: -rival.support)
-    evidence = evidence_of(agreement, held, own, found, target)
+    evidence = {
+        **evidence_of(agreement, held, own, found, target),
+        "closely": closeness(scene, pose.T),
+        **_at_another_size(scene, pose),
+    }
     return Weighed(
         agreement=agreement, held=held, rivals=found, evidence=evidence, confidence=confidence(evidence)
     )
+
+
+def _at_another_size(scene: Scene, pose: Pose) -> dict[str, float]:
+    scale, gain = size(scene, pose.T) if pose.found else Size()
+    return {"scale": scale, "size_gain": gain}
 
 
 def evidence_of(
@@ -148,6 +160,9 @@ def evidence_of(
     matched : agreeing share of the matches of that matcher of which most agree; 0 where none ran
     closeness : how much less closely the points lie on the surfaces, to the sensors' noise, than under the rival where
         they do most, nats per point; 0 where they lie most closely, or where no rival comes near
+    closely : how closely the points lie on the other cloud's surfaces, to the sensors' noise, nats per point
+    scale, size_gain : size at which the source fits better, and by how many nats per point; 1 and 0 where none does
+    overturned : 1 where the world is turned over or a sensor stands under the other's ground, else 0
     support : log-odds that the pose is right, were there no other
     rival_margin : how far the best rival's support lies above it (-20 without rivals)
     """
@@ -177,8 +192,9 @@ def _surfaces(way: OneWay, target: View) -> dict[str, float]:
     }
 
 
-def _images(source: View, target: View) -> tuple[str, ...]:
-    return tuple(name for name, view in (("source", source), ("target", target)) if view.image is not None)
+def _unseen(scene: Scene) -> dict[str, str]:
+    clouds = {"source": scene.pair.source, "target": scene.pair.target}
+    return {name: cloud.seen.words for name, cloud in clouds.items() if cloud.viewpoint is None}
 
 
 def _close(found: list[Rival], support: float) -> Array:

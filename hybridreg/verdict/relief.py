@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybridreg import se3
-from hybridreg.classical.ground import Ground
+from hybridreg.ground import Ground
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -86,7 +86,7 @@ class Relief:
 
     @classmethod
     def of(cls, points: Array, viewpoint: Array, ground: Ground, cell: float) -> Relief:
-        """Relief of a cloud (n, 3) whose sensor stood at `viewpoint` (3,) over `ground`."""
+        """Relief of a cloud (n, 3) that was seen from about `viewpoint` (3,), over `ground`."""
         centre = ground.levelling @ viewpoint
         T = se3.from_rt(ground.levelling, -np.array([centre[0], centre[1], ground.height]))
         level = se3.apply(T, points)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Poses that might explain the data: what an estimator offers, half a turn, a slide along the street."""
+"""Poses that might explain the data: what an estimator offers, half a turn, the same things a few metres on."""
 
 from __future__ import annotations
 
@@ -17,6 +17,7 @@ from hybridreg.verdict import matched, support, views
 from hybridreg.verdict.agreement import Agreement
 from hybridreg.verdict.closeness import closeness, settle_closely
 from hybridreg.verdict.confidence import NEARLY
+from hybridreg.verdict.copies import copies
 from hybridreg.verdict.information import Information
 from hybridreg.verdict.settle import settle
 from hybridreg.verdict.views import View
@@ -24,9 +25,7 @@ from hybridreg.verdict.views import View
 Array = NDArray[np.float64]
 
 # Rivals that the estimator offers, the best first; how many of all are settled, until so many are found.
-_OFFERED, _SETTLED, _CLOSELY = 4, 6, 3
-# Slides along the direction that is held least, in spacings: about 4 and 8 m outdoors, 1 and 2 m in a room.
-_SLIDES = (-16.0, -8.0, 8.0, 16.0)
+_OFFERED, _SETTLED, _CLOSELY = 4, 8, 4
 # Nearer than this (spacings, degrees) a rival is the pose itself.
 _APART, _TURNED = 3.0, 5.0
 _QUICK, _CLOSE, _ROUGHLY = 10, 2, 3
@@ -68,10 +67,19 @@ def best_first(scene: Scene, starts: Sequence[Array]) -> list[Rival]:
     """
     known = _known(scene)
     resting = [known[one.tobytes()] for one in starts if one.tobytes() in known]
-    quickly = [_settled(scene, one, _ROUGHLY) for one in starts if one.tobytes() not in known]
+    quickly = [_settled(scene, one, _ROUGHLY, _QUICK) for one in starts if one.tobytes() not in known]
     _tried(scene).extend(quickly)
-    apart = distinct(scene, quickly)[:_KEPT]
-    closely = [_settled(scene, one.T, 1) if one.support > apart[0].support - _LEFT else one for one in apart]
+    # A tenth of the points tells most from the best; a third of them ranks those that are left.
+    source, target = views.views(scene)
+    spacing = views.spacing(scene)
+    apart = [
+        one._replace(by_surfaces=support.of(source, target, one.T, spacing, _ROUGHLY))
+        for one in distinct(scene, quickly)[: 2 * _KEPT]
+    ]
+    apart = sorted(apart, key=lambda one: -one.support)[:_KEPT]
+    closely = [
+        _settled(scene, one.T, 1, 1) if one.support > apart[0].support - _LEFT else one for one in apart
+    ]
     found = [*resting, *closely]
     known.update((one.T.tobytes(), one) for one in found)
     return distinct(scene, found)[:_KEPT]
@@ -100,11 +108,11 @@ def resting(scene: Scene, poses: Iterable[Array]) -> list[Rival]:
     return found
 
 
-def _settled(scene: Scene, start: Array, every: int) -> Rival:
+def _settled(scene: Scene, start: Array, every: int, looked_at: int) -> Rival:
     source, target = views.views(scene)
     spacing = views.spacing(scene)
     T = settle(source, target, start, spacing, every=3 * every, wide=every == 1)
-    return Rival(T, support.of(source, target, T, spacing, every))
+    return Rival(T, support.of(source, target, T, spacing, looked_at))
 
 
 def _tried(scene: Scene) -> list[Rival]:
@@ -143,9 +151,9 @@ def counted(scene: Scene, found: Iterable[Rival], answers: Iterable[Iterable[Riv
 
 def told_apart(scene: Scene, found: Sequence[Rival]) -> list[Rival]:
     """The same poses in the same order, with their closeness where it may decide which of them is right."""
-    best = max((one.support for one in found), default=BEYOND_DOUBT)
+    best = max((one.support for one in found), default=0.0)
     rows = [row for row, one in enumerate(found) if one.support > best - _CONTENDS]
-    if best >= BEYOND_DOUBT or len(rows) < 2:
+    if len(rows) < 2:
         return list(found)
     close = {row: closeness(scene, found[row].T) for row in rows}
     closest = max(close.values())
@@ -174,7 +182,7 @@ def find(
     guesses = [
         *offered[:_OFFERED],
         *_turned(source, target, T, agreement, information),
-        *_slid(T, agreement, spacing),
+        *copies(source, target, T, agreement.axes, spacing),
     ]
     guesses = [guess for guess in guesses if differs(guess, T, information.centre, spacing)]
     found: list[Rival] = []
@@ -211,10 +219,6 @@ def _middle(points: Array, axes: Array) -> Array:
     # Midway between the outer twentieths along each axis: a centroid would follow the sensor.
     low, high = np.quantile(points[:: max(1, len(points) // 2_000)] @ axes.T, [0.05, 0.95], axis=0)
     return 0.5 * (low + high) @ axes
-
-
-def _slid(T: Array, agreement: Agreement, spacing: float) -> list[Array]:
-    return [se3.from_rt(np.eye(3), length * spacing * agreement.axes[2]) @ T for length in _SLIDES]
 
 
 def differs(rival: Array, T: Array, centre: Array, spacing: float) -> bool:

@@ -27,14 +27,13 @@ _FEWEST = 30
 
 
 class Planes(Protocol):
-    """What points are laid on: points (n, 3) with normals (n, 3), and their KD-tree."""
+    """What points are laid on: points (n, 3), their KD-tree, and the normals of some rows."""
 
     @property
     def points(self) -> Array: ...
     @property
-    def normals(self) -> Array: ...
-    @property
     def tree(self) -> cKDTree: ...
+    def facing(self, rows: NDArray[np.int64]) -> Array: ...
 
 
 def settle(
@@ -71,7 +70,7 @@ def descend(T: Array, points: Array, surfaces: Planes, steps: Iterable[tuple[flo
         if np.count_nonzero(hit) < _FEWEST:
             return T
         row = np.asarray(match)[hit]
-        T = _step_onto(surfaces.points[row], surfaces.normals[row], moved[hit], width) @ T
+        T = _step_onto(surfaces.points[row], surfaces.facing(row), moved[hit], width) @ T
     return T
 
 

@@ -26,6 +26,8 @@ Mask = NDArray[np.bool_]
 _UNHELD = 1e-4
 # A share below this is as good as none.
 _NOTHING = 0.02
+# Log-odds that a pose loses which turns the world over: by hand, as no evidence makes up for it.
+_OVERTURNED = 20.0
 # Nats of the relief that are believed at most; beyond all doubt already.
 _TOLD = 1000.0
 
@@ -48,7 +50,8 @@ def support(evidence: Mapping[str, float]) -> float:
     """Log-odds that a pose with this evidence (`numbers`) is right, were there no other pose."""
     weights, intercept = model()
     told = terms(evidence)
-    return intercept + sum(weight * told[name] for name, weight in weights.items())
+    by_terms = intercept + sum(weight * told[name] for name, weight in weights.items())
+    return by_terms - _OVERTURNED * evidence["overturned"]
 
 
 def terms(evidence: Mapping[str, float]) -> dict[str, float]:
@@ -111,6 +114,7 @@ def numbers(
         "recipes": recipes,
         "matched": matched,
         "closeness": closeness,
+        "overturned": agreement.overturned,
     }
     for side, way in (("source", agreement.source), ("target", agreement.target)):
         found[f"looked_through_{side}"] = share(way.free, way.looked)

@@ -11,12 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from hybridreg import normals
-from hybridreg.classical import ground
-from hybridreg.range_image import RangeImage
+from hybridreg import ground, normals
+from hybridreg.ground import Ground
+from hybridreg.range_image import RangeImage, RangeImages
 from hybridreg.resolution import default_voxel, map_cell
 from hybridreg.resources import n_workers
-from hybridreg.scene import Level, Scene
+from hybridreg.scene import Level, Scene, centre
 from hybridreg.verdict.axes import balanced
 from hybridreg.verdict.relief import Relief
 
@@ -39,7 +39,7 @@ class View:
     ----------
     points, normals : (n, 3) float64
     tree : KD-tree of the points
-    image : RangeImage or None
+    image : RangeImage, RangeImages or None
         None where the sensor's place is not known.
     asked : (m,) int64
         Rows that are compared with the other cloud.
@@ -47,15 +47,28 @@ class View:
         Rows by which a pose settles: surfaces that face each way equally often, in random order.
     relief : Relief or None
         Of the ground; None where the cloud shows none.
+    ground : Ground or None
+        None where the cloud shows none, or where its upper side tells nothing (gravity is not known).
+    thickness : float
+        Metres by which the ground may differ from a plane.
+    centre : (3,) float64
+        Where the cloud was seen from, or its middle.
     """
 
     points: Array
     normals: Array
     tree: cKDTree
-    image: RangeImage | None
+    image: RangeImage | RangeImages | None
     asked: NDArray[np.int64]
     settling: NDArray[np.int64]
     relief: Relief | None
+    ground: Ground | None
+    thickness: float
+    centre: Array
+
+    def facing(self, rows: NDArray[np.int64]) -> Array:
+        """Normals (k, 3) of some points."""
+        return self.normals[rows]
 
 
 def views(scene: Scene) -> tuple[View, View]:
@@ -92,23 +105,18 @@ def _view(scene: Scene, side: Side, wanted: float, on_grid: Scene) -> View:
         points=points,
         normals=surface,
         tree=tree,
-        image=_image(scene, side),
+        image=getattr(scene.pair, side).range_image,
         asked=asked,
         settling=balanced(surface, _N_ASKED),
         relief=_relief(scene, side, on_grid),
+        ground=ground.find(on_grid, side) if scene.pair.gravity == "known" else None,
+        thickness=ground.thickness(points, wanted),
+        centre=centre(level),
     )
 
 
 def _relief(scene: Scene, side: Side, on_grid: Scene) -> Relief | None:
     found, level = ground.find(on_grid, side), getattr(on_grid, side)
-    if found is None or level.viewpoint is None:
+    if found is None:
         return None
-    return Relief.of(getattr(scene.pair, side).points, level.viewpoint, found, level.spacing)
-
-
-def _image(scene: Scene, side: Side) -> RangeImage | None:
-    cloud = getattr(scene.pair, side)
-    viewpoint = cloud.viewpoint
-    if viewpoint is None:
-        return None
-    return scene.shared(("range image", side), lambda: RangeImage.of(cloud.points, viewpoint))
+    return Relief.of(getattr(scene.pair, side).points, centre(level), found, level.spacing)

@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 
 from hybridreg.verdict.agreement import Agreement
-from hybridreg.verdict.confidence import NEARLY
+from hybridreg.verdict.confidence import NEARLY, SIZE_GAIN
 from hybridreg.verdict.information import Information
 
 # Where a number becomes worth a sentence. In simulated scenes nine in ten right poses stayed on the good side.
@@ -21,16 +21,26 @@ def reasons(
     held: Information,
     *,
     found: bool,
-    images: tuple[str, ...],
+    unseen: Mapping[str, str],
 ) -> tuple[str, ...]:
-    """Why the verdict is what it is; never empty."""
+    """Why the verdict is what it is; never empty. `unseen` tells why a cloud has no sensor's place."""
     if not found:
         return ("no pose was found: the estimator had nothing to work with, and returned the identity",)
-    against = (*_against(evidence, agreement, held), *_unknown(images))
+    against = (*_against(evidence, agreement, held), *_unknown(unseen))
     return (*against, _in_favour(evidence)) if against else (_in_favour(evidence),)
 
 
 def _against(evidence: Mapping[str, float], agreement: Agreement, held: Information) -> Iterator[str]:
+    if evidence["overturned"]:
+        yield (
+            "the pose turns the world over, or puts a sensor under the other cloud's ground; where one cloud may be "
+            'upside down, say so: gravity="unknown" (--gravity unknown)'
+        )
+    if evidence["size_gain"] > SIZE_GAIN:
+        yield (
+            f"the source fits better when it is multiplied by {evidence['scale']:.3f}: "
+            "is it scaled, or its sensor's calibration off?"
+        )
     through = evidence["looked_through"]
     if through > LOOKED_THROUGH:
         yield (
@@ -61,13 +71,9 @@ def _about_axis(agreement: Agreement, k: int) -> str:
     return f"of {looked} points that face along ({direction}) of the target and were looked at, only {agreed} agree"
 
 
-def _unknown(images: tuple[str, ...]) -> Iterator[str]:
-    for name in ("source", "target"):
-        if name not in images:
-            yield (
-                f"the place of the {name}'s sensor is not known (its origin lies outside the cloud): "
-                "what it looked through could not be tested"
-            )
+def _unknown(unseen: Mapping[str, str]) -> Iterator[str]:
+    for name, why in unseen.items():
+        yield f"where the {name} was seen from is not known ({why}): free space could not be tested from there"
 
 
 def _in_favour(evidence: Mapping[str, float]) -> str:

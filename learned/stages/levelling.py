@@ -10,7 +10,7 @@ import torch
 from numpy.typing import NDArray
 from torch.nn import functional as F
 
-from hybridreg.classical import ground
+from hybridreg import ground
 from hybridreg.learned.network import CloudEncoding, Encoding
 from hybridreg.learned.superpoint_evidence import partners
 from hybridreg.scene import Scene

@@ -9,8 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from hybridreg import se3
-from hybridreg.classical import ground
+from hybridreg import ground, se3
 from hybridreg.classical.visibility import Visibility
 from hybridreg.classical.voxel import VoxelGrid
 from hybridreg.cloud import PointCloud

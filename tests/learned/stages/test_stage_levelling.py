@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 import hybridreg as hr
-from hybridreg import se3
-from hybridreg.classical import ground
+from hybridreg import ground, se3
 from hybridreg.eval import metrics
 from hybridreg.learned.stages import encoding
 from hybridreg.learned.stages.levelling import Turns, likeness

@@ -1,17 +1,18 @@
 # SPDX-License-Identifier: MIT
-"""The ground of one cloud, in whatever way its sensor hung."""
+"""The ground of one cloud, in whatever way its sensor hung; of a map too, which no single sensor saw."""
 
 from __future__ import annotations
 
-from typing import Any, Literal, NamedTuple
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hybridreg import se3
-from hybridreg.extent import radii
-from hybridreg.resolution import reach
-from hybridreg.scene import Level, Scene
+from hybridreg.extent import radii, reach
+
+if TYPE_CHECKING:
+    from hybridreg.scene import Level, Scene
 
 Array = NDArray[np.float64]
 Weights = NDArray[np.float64]
@@ -58,39 +59,58 @@ def on_grid(scene: Scene, voxel: float) -> Scene:
 
 
 def find(scene: Scene, side: Literal["source", "target"]) -> Ground | None:
-    """Ground of one level, or None where no plane below the sensor carries enough of the points.
+    """Ground of one level, or None where no plane carries enough of the points; see `under`."""
 
-    A search over planes through three points of the level, with a seed of its own: the one that holds most points,
-    with few below it, near points counting more (far ground rises and falls). The sensor may hang in any way;
-    where two planes compete, the one under an upright sensor wins.
+    def look() -> Ground | None:
+        level: Level = getattr(scene, side)
+        return under(level.points, level.viewpoint, level.spacing)
+
+    return scene.shared(("ground", side), look)
+
+
+def under(points: Array, viewpoint: Array | None, spacing: float) -> Ground | None:
+    """Ground of `points` (n, 3), or None where no plane carries enough of them.
+
+    A search over planes through three points, with a seed of its own: the one that holds most points, with few below
+    it, near points counting more (far ground rises and falls). The sensor may hang in any way; where two planes
+    compete, the one under an upright sensor wins.
+
+    Parameters
+    ----------
+    viewpoint : (3,), (k, 3) or None
+        Where the sensor stood, on the upper side of the ground. Without it, up is where the other points are.
+    spacing : float
+        Metres between neighbouring points.
     """
-    return scene.shared(("ground", side), lambda: _find(getattr(scene, side)))
-
-
-def _find(level: Level) -> Ground | None:
-    viewpoint = level.viewpoint
-    if viewpoint is None or len(level) < 3:
+    if len(points) < 3:
         return None
     rng = np.random.default_rng(0)
-    points = level.points[rng.permutation(len(level))[: 4 * _MANY]] - viewpoint
+    middle = np.median(points, axis=0) if viewpoint is None else np.atleast_2d(viewpoint).mean(axis=0)
+    points = points[rng.permutation(len(points))[: 4 * _MANY]] - middle
+    seen = viewpoint is not None
     weights = _nearer_more(points)
-    thick = max(_SPACINGS * level.spacing, min(_THICK, _OF_REACH * reach(radii(points))))
-    ups, heights = _planes(points, rng)
+    thick = thickness(points, spacing)
+    ups, heights = _planes(points, rng, seen)
     for n, kept in ((_FEW, _LOOKED_AT), (_MANY, _FITTED)):
-        scores = _scores(points[:n], weights[:n], ups, heights, thick)
+        scores = _scores(points[:n], weights[:n], ups, heights, thick, seen)
         best = np.argsort(-scores, kind="stable")[:kept]
         ups, heights = ups[best], heights[best]
-    found = [_fitted(points, weights, up, float(h), thick) for up, h in zip(ups, heights, strict=True)]
+    found = [_fitted(points, weights, up, float(h), thick, seen) for up, h in zip(ups, heights, strict=True)]
     if not found:
         return None
     ups, heights = np.array([g.up for g in found]), np.array([g.height for g in found])
-    scores = _scores(points, weights, ups, heights, thick)
+    scores = _scores(points, weights, ups, heights, thick, seen)
     best_one = int(np.argmax(scores))
     up, height = found[best_one]
     # Where no plane competes, a steep one needs no more points than another.
     if scores[best_one] < _LEAST * (_STEEP if _steep(up) else 1.0):
         return None
-    return Ground(up, height + float(up @ viewpoint))
+    return Ground(up, height + float(up @ middle))
+
+
+def thickness(points: Array, spacing: float) -> float:
+    """Half the thickness of a cloud's ground, metres: a plane follows uneven ground only so well."""
+    return max(_SPACINGS * spacing, min(_THICK, _OF_REACH * reach(radii(points))))
 
 
 def _nearer_more(points: Array) -> Weights:
@@ -99,24 +119,26 @@ def _nearer_more(points: Array) -> Weights:
     return weights / weights.sum()
 
 
-def _planes(points: Array, rng: np.random.Generator) -> tuple[Array, Array]:
-    # Planes through three points, their normals towards the sensor, which is the origin.
+def _planes(points: Array, rng: np.random.Generator, seen: bool) -> tuple[Array, Array]:
+    # Planes through three points, their normals towards the sensor, which is the origin; both ways where it is not.
     a, b, c = points[rng.integers(0, len(points), (3, _TRIPLES))]
     normals = np.cross(b - a, c - a)
     length = np.linalg.norm(normals, axis=1)
     good = length > 1e-12 * np.max(length, initial=1e-30)
     ups = normals[good] / length[good, None]
     heights = np.einsum("ni,ni->n", ups, a[good])
+    if not seen:
+        return np.concatenate([ups, -ups]), np.concatenate([heights, -heights])
     above = np.where(heights > 0.0, -1.0, 1.0)
     return ups * above[:, None], heights * above
 
 
-def _scores(points: Array, weights: Weights, ups: Array, heights: Array, thick: float) -> Weights:
+def _scores(points: Array, weights: Weights, ups: Array, heights: Array, thick: float, seen: bool) -> Weights:
     above = (ups @ points.T - heights[:, None]) / thick  # (B, n)
     weights = weights / weights.sum()
     share = (np.abs(above) < 1.0) @ weights - (above < -2.0) @ weights
     likely = np.where(_steep(ups), _STEEP, 1.0)
-    likely *= np.where(-heights > _FAR_METRES, _FAR, 1.0)
+    likely *= np.where(-heights > _FAR_METRES, _FAR, 1.0) if seen else 1.0
     return share * likely * np.where(ups[:, 2] < 0.0, _UPTURNED, 1.0)
 
 
@@ -125,7 +147,7 @@ def _steep(up: Array) -> Any:
     return np.abs(up[..., 2]) < np.cos(np.radians(_STEEP_DEG))
 
 
-def _fitted(points: Array, weights: Weights, up: Array, height: float, thick: float) -> Ground:
+def _fitted(points: Array, weights: Weights, up: Array, height: float, thick: float, seen: bool) -> Ground:
     for width in (2.0, 1.0, 1.0):
         on = np.abs(points @ up - height) < width * thick
         if np.count_nonzero(on) < 3:
@@ -133,6 +155,7 @@ def _fitted(points: Array, weights: Weights, up: Array, height: float, thick: fl
         centre = np.average(points[on], axis=0, weights=weights[on])
         centred = points[on] - centre
         normal = np.linalg.eigh((weights[on, None] * centred).T @ centred)[1][:, 0]
-        up = normal if normal @ centre < 0.0 else -normal
+        turned = normal @ centre > 0.0 if seen else normal @ up < 0.0
+        up = -normal if turned else normal
         height = float(up @ centre)
     return Ground(up, height)

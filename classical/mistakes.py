@@ -1,0 +1,77 @@
+# SPDX-License-Identifier: MIT
+"""When no pose fits: would one fit the source's mirror image, or the source in another unit?"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hybridreg.classical.birdseye import BirdsEye
+from hybridreg.classical.voxel import VoxelGrid
+from hybridreg.cloud import PointCloud
+from hybridreg.extent import reach
+from hybridreg.matches import Correspondences
+from hybridreg.pair import Pair
+from hybridreg.scene import Scene
+from hybridreg.verdict import weigh
+from hybridreg.verdict.confidence import OK
+
+Array = NDArray[np.float64]
+
+# Metres of one unit, and its name.
+_UNITS = ((0.001, "millimetres"), (0.01, "centimetres"), (0.3048, "feet"))
+# The shorter reach over the longer one below which no rigid pose is looked for at length.
+COMPARABLE = 1.0 / 25.0
+# Poses that are tried under a mistake: the right one is among the first where the clouds fit well.
+_TRIES = 10
+# Reaches of two clouds of one place, in one unit, differ by less than this factor more often than not.
+_ALIKE = 4.0
+
+
+def size_ratio(pair: Pair) -> float:
+    """Reach of the target over that of the source."""
+    source, target = (reach(cloud.radii) for cloud in (pair.source, pair.target))
+    return target / source if source > 0.0 and target > 0.0 else 1.0
+
+
+def explanations(scene: Scene) -> list[str]:
+    """Sentences for the mistakes under which the clouds fit beyond doubt: at most one."""
+    for side, factors, sentence in _changes(scene.pair):
+        changed = _changed(getattr(scene.pair, side), factors)
+        if _fits(replace(scene.pair, image=None, **{side: changed})):
+            return [sentence]
+    return []
+
+
+def _changes(pair: Pair) -> Iterator[tuple[str, Array, str]]:
+    # Cloud, what its coordinates are multiplied by, and the sentence.
+    ratio = size_ratio(pair)
+    for metres, unit in _UNITS:
+        for factor, side in ((metres, "source"), (1.0 / metres, "target")):
+            off = abs(np.log(ratio / factor))
+            if off < np.log(_ALIKE) and off < abs(np.log(ratio)):
+                yield (
+                    side,
+                    np.full(3, metres),
+                    f"the clouds fit when the {side} is taken to be in {unit}: multiply its coordinates by {metres:g}",
+                )
+    if COMPARABLE < ratio < 1.0 / COMPARABLE:
+        yield (
+            "source",
+            np.array([1.0, -1.0, 1.0]),
+            "the source fits as its mirror image: was it exported left-handed? Change the sign of one axis",
+        )
+
+
+def _changed(cloud: PointCloud, factors: Array) -> PointCloud:
+    seen = cloud.seen
+    return PointCloud(points=cloud.points * factors, said=seen._replace(places=seen.places * factors))
+
+
+def _fits(pair: Pair) -> bool:
+    scene = VoxelGrid()(pair)
+    pose = BirdsEye(tries=_TRIES)(scene, Correspondences.none(), np.random.default_rng(0))
+    return pose.found and weigh(scene, pose).confidence >= OK

@@ -1,0 +1,126 @@
+# SPDX-License-Identifier: MIT
+"""No wrong pose "ok": worlds turned over, mirrored, scaled, or held twice."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from made_places import Made
+
+from hybridreg import se3
+from hybridreg.classical import mistakes
+from hybridreg.classical.voxel import VoxelGrid
+from hybridreg.matches import Correspondences, Pose
+from hybridreg.pair import Pair
+from hybridreg.resolution import tolerance
+from hybridreg.scene import Scene
+from hybridreg.verdict import judge, support, views
+from hybridreg.verdict.copies import copies
+from hybridreg.verdict.similarity import size
+from hybridreg.verdict.upright import overturned
+
+NONE = Correspondences.none()
+
+
+def changed(made: Made, factors: float | np.ndarray) -> Pair:
+    """The pair with its source's coordinates multiplied."""
+    pair = made.scene.pair
+    return Pair.of(pair.source.points * factors, pair.target.points)
+
+
+def about_middle(made: Made, factor: float) -> np.ndarray:
+    """Where the scaled source lies best: its middle where it was."""
+    middle = np.median(made.scene.pair.source.points, axis=0)
+    T = made.truth.copy()
+    T[:3, 3] = se3.apply(made.truth, middle[None])[0] - T[:3, :3] @ (factor * middle)
+    return T
+
+
+def test_a_pose_that_turns_the_world_over_is_failed(crossing: Made) -> None:
+    source, target = views.views(crossing.scene)
+    assert not overturned(source, target, crossing.truth)
+    over = se3.from_rt(se3.rotation_about(np.array([np.pi, 0.0, 0.0])), np.array([0.0, 0.0, -3.6]))
+    assert overturned(source, target, over @ crossing.truth)
+    judgement = judge(crossing.scene, Pose(over @ crossing.truth), NONE)
+    assert judgement.verdict == "failed"
+    assert "turns the world over" in judgement.reasons[0]
+
+
+def test_a_pose_that_puts_a_sensor_under_the_ground_is_failed(crossing: Made) -> None:
+    sunk = se3.from_rt(np.eye(3), np.array([0.0, 0.0, -5.0])) @ crossing.truth
+    assert overturned(*views.views(crossing.scene), sunk)
+
+
+def test_where_gravity_is_unknown_nothing_is_turned_over(crossing: Made) -> None:
+    scene = VoxelGrid()(replace(crossing.scene.pair, gravity="unknown"))
+    over = se3.from_rt(se3.rotation_about(np.array([np.pi, 0.0, 0.0])), np.array([0.0, 0.0, -3.6]))
+    assert not overturned(*views.views(scene), over @ crossing.truth)
+    with pytest.raises(ValueError, match="gravity"):
+        Pair.of(np.eye(3), np.eye(3), gravity="down")
+
+
+@pytest.mark.parametrize("factor", [0.93, 0.95, 0.97, 1.03, 1.05])
+def test_a_source_of_another_size_is_never_ok_and_its_size_is_told(crossing: Made, factor: float) -> None:
+    scene = VoxelGrid()(changed(crossing, factor))
+    pose = Pose(about_middle(crossing, factor))
+    scale, gain = size(scene, pose.T)
+    assert scale == pytest.approx(1.0 / factor, abs=0.01)
+    assert gain > 0.2
+    judgement = judge(scene, pose, NONE)
+    assert judgement.verdict != "ok"
+    assert any(f"multiplied by {scale:.3f}" in reason for reason in judgement.reasons)
+
+
+@pytest.mark.parametrize("place", ["crossing", "fan"])
+def test_the_right_size_is_not_doubted(place: str, request: pytest.FixtureRequest) -> None:
+    made: Made = request.getfixturevalue(place)
+    assert size(made.scene, made.truth).gain < 0.2
+
+
+def test_a_map_that_holds_a_place_twice_shows_its_other_copy(crossing: Made) -> None:
+    pair = crossing.scene.pair
+    copy = se3.from_rt(se3.rotation_about(np.array([0.0, 0.0, np.radians(1.5)])), np.array([2.5, 0.4, 0.0]))
+    twice = np.vstack([pair.target.points, se3.apply(copy, pair.target.points)])
+    scene = VoxelGrid()(Pair.of(pair.source.points, twice))
+    found = copies(
+        *views.views(scene), crossing.truth, support.seen(scene, crossing.truth)[0].axes, views.spacing(scene)
+    )
+    off = [se3.inverse(copy @ crossing.truth) @ T for T in found]
+    assert min(np.linalg.norm(T[:3, 3]) for T in off) < 1.0
+    judgement = judge(scene, Pose(crossing.truth), NONE)
+    near = [np.linalg.norm((se3.inverse(copy @ crossing.truth) @ T)[:3, 3]) for T in judgement.rivals]
+    assert judgement.verdict != "ok"
+    assert min(near) < 0.5
+
+
+def test_a_mirrored_source_is_named(crossing: Made) -> None:
+    told = mistakes.explanations(VoxelGrid()(changed(crossing, np.array([1.0, -1.0, 1.0]))))
+    assert told
+    assert "mirror image" in told[0]
+
+
+@pytest.mark.parametrize(
+    "factor, unit", [(1000.0, "millimetres"), (100.0, "centimetres"), (1 / 0.3048, "feet")]
+)
+def test_another_unit_is_named_with_its_cloud(crossing: Made, factor: float, unit: str) -> None:
+    told = mistakes.explanations(VoxelGrid()(changed(crossing, factor)))
+    assert told
+    assert f"the source is taken to be in {unit}" in told[0]
+    pair = changed(crossing, factor)
+    told = mistakes.explanations(VoxelGrid()(Pair(source=pair.target, target=pair.source)))
+    assert told
+    assert f"the target is taken to be in {unit}" in told[0]
+
+
+def test_a_right_pair_is_no_mistake(crossing: Made, elsewhere: Scene) -> None:
+    assert mistakes.size_ratio(crossing.scene.pair) == pytest.approx(1.0, rel=0.5)
+    assert mistakes.explanations(elsewhere) == []
+
+
+def test_the_tolerance_follows_the_size_of_the_scene(crossing: Made) -> None:
+    pair = crossing.scene.pair
+    assert tolerance(pair.source, pair.target) == (2.0, 0.5)
+    small = Pair.of(pair.source.points / 500.0, pair.target.points / 500.0)
+    assert tolerance(small.source, small.target).metres < 0.005
