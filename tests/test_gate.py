@@ -142,11 +142,6 @@ def test_offset_comes_off_in_whole_kilometres() -> None:
     assert np.array_equal(PointCloud.of(GOOD + 900.0).offset, np.zeros(3)), "900 m is no map grid"
 
 
-def test_viewpoint_is_the_origin_where_the_sensor_may_have_stood() -> None:
-    assert np.array_equal(PointCloud.of(GOOD).viewpoint, np.zeros(3))
-    assert PointCloud.of(GOOD + 500.0).viewpoint is None
-
-
 def test_pickles() -> None:
     cloud = pickle.loads(pickle.dumps(PointCloud.of(GOOD, sensor="fan")))
     assert cloud.sensor == "fan"

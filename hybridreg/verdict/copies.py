@@ -38,16 +38,13 @@ def copies(source: View, target: View, T_target_source: Array, axes: Array, spac
         return []
     middle = things.mean(axis=0)
     reach = round(_FARTHEST / _CELL)
-    near = (
-        np.abs((other - middle) @ frame.T).max(axis=1)
-        < np.abs((things - middle) @ frame.T).max() + 2 * reach * cell
-    )
-    held, origin = _grid((other[near] - middle) @ frame.T, cell, reach)
+    arms, others = things - middle, (other - middle) @ frame.T
+    near = np.abs(others).max(axis=1) < np.linalg.norm(arms, axis=1).max() + 2 * reach * cell
+    if not near.any():
+        return []
+    held, origin = _grid(others[near], cell, reach)
     met = np.stack(
-        [
-            _met(_turned(things - middle, axes[0], deg) @ frame.T, held, origin, cell, reach)
-            for deg in _TURNS_DEG
-        ]
+        [_met(_turned(arms, axes[0], deg) @ frame.T, held, origin, cell, reach) for deg in _TURNS_DEG]
     )
     best, turn = met.max(axis=0), met.argmax(axis=0)
     peaks = _peaks(best, max(_SHARE * best[reach, reach], 0.5 * _FEWEST))

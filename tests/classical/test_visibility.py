@@ -38,6 +38,12 @@ def scene_of(source: Array, target: Array, voxel: float = 0.5) -> Scene:
     return VoxelGrid(voxel=voxel)(Pair(source=PointCloud.of(source), target=PointCloud.of(target)))
 
 
+def seen_from_origin(source: Array, target: Array, voxel: float) -> Scene:
+    """Clouds that no sensor could have seen from where it is said to have stood."""
+    clouds = (PointCloud.of(points, viewpoint=np.zeros(3)) for points in (source, target))
+    return VoxelGrid(voxel=voxel)(Pair(**dict(zip(("source", "target"), clouds, strict=True))))
+
+
 CIRCLE = plain(40.0, (-25.0, 15.0))
 FAN = plain(15.0, (-45.0, 5.0), azimuth_deg=70.0)
 
@@ -130,7 +136,8 @@ def test_where_no_plane_is_level_a_steep_one_is_the_ground() -> None:
 def test_no_ground_no_vertical_but_still_a_range() -> None:
     directions = np.random.default_rng(0).normal(size=(6000, 3))
     ball = directions / np.linalg.norm(directions, axis=1, keepdims=True)
-    scene = scene_of(10.0 * ball, np.concatenate([30.0 * ball[:3000], 5.0 * ball[3000:]]), voxel=0.4)
+    both = np.concatenate([30.0 * ball[:3000], 5.0 * ball[3000:]])
+    scene = seen_from_origin(10.0 * ball, both, voxel=0.4)
     assert ground.find(scene, "source") is None
     overlap = Visibility(baseline=2.0)(scene)
     distance = np.linalg.norm(scene.target.points, axis=1)

@@ -60,6 +60,7 @@ def test_few_points_count_for_little() -> None:
         agreed=np.array([900.0, 90.0, 5.0]),
         through=np.zeros(3),
         relief=Alike(0.0, 0.0),
+        overturned=False,
     )
     assert made.shares == pytest.approx([900 / 1020, 90 / 120, 5 / 25])
 

@@ -40,6 +40,7 @@ EVIDENCE = {
     "recipes": st.integers(1, 5),
     "matched": share,
     "closeness": st.floats(-3.0, 0.0),
+    "overturned": st.sampled_from([0.0, 1.0]),
 }
 own = st.fixed_dictionaries(EVIDENCE)
 log_odds = st.floats(-15.0, 15.0)
@@ -49,6 +50,8 @@ WHOLE = EVIDENCE | {
     "visible_target": share,
     "fitness_visible_source": share,
     "fitness_visible_target": share,
+    "closely": st.floats(-1.7, 2.5),
+    "size_gain": st.floats(0.0, 2.0),
     "support": log_odds,
     "rival_margin": st.floats(NO_RIVAL, 10.0),
 }
@@ -58,7 +61,7 @@ whole = st.fixed_dictionaries(WHOLE)
 @given(
     own,
     # Common ground alone is neither: it is how alike it is.
-    st.sampled_from([name for name in EVIDENCE if name != "relief_cells"]),
+    st.sampled_from([name for name in EVIDENCE if name not in ("relief_cells", "overturned")]),
     share,
 )
 def test_more_agreement_and_fewer_objections_never_lower_the_support(
@@ -87,6 +90,7 @@ def test_the_rule_weighs_the_terms_and_nothing_else() -> None:
         "recipes": 1,
         "matched": 0.4,
         "closeness": -0.2,
+        "overturned": 0.0,
     }
     assert set(model().weights) == set(terms(numbers))
     assert support({**numbers, "normals": 0.9}) == support(numbers)
@@ -115,6 +119,12 @@ def test_what_speaks_for_a_pose_never_lowers_its_confidence_nor_does_the_contrar
 def test_two_poses_that_explain_the_data_alike_are_never_ok(evidence: dict[str, float]) -> None:
     assert confidence({**evidence, "rival_margin": 0.0}) <= 0.5
     assert word(confidence({**evidence, "rival_margin": -0.8 * NEARLY})) != "ok"
+
+
+@given(whole)
+def test_no_pose_that_turns_the_world_over_or_fits_at_another_size_is_ok(evidence: dict[str, float]) -> None:
+    assert word(confidence({**evidence, "overturned": 1.0})) == "failed"
+    assert word(confidence({**evidence, "size_gain": 0.3})) != "ok"
 
 
 @given(log_odds, st.floats(NO_RIVAL, 10.0))
