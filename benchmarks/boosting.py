@@ -9,10 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 from sklearn.ensemble import HistGradientBoostingClassifier
 
+from hybridreg.verdict.boosted import Boosted
 from hybridreg.verdict.confidence import SPEAKS
 
 # Few and shallow trees, each leaf on some answers: there are hundreds of answers, not thousands.
 DEPTH, TREES, RATE, LEAF, RIDGE = 3, 200, 0.05, 12, 1.0
+# Trees that are added to stored ones.
+MORE = 60
 
 
 def boost(
@@ -49,4 +52,56 @@ def _tree(nodes: NDArray[Any]) -> dict[str, list[float]]:
         "left": np.where(leaf, -1, nodes["left"].astype(int)).tolist(),
         "right": np.where(leaf, -1, nodes["right"].astype(int)).tolist(),
         "value": [float(f"{x:.6g}") for x in np.where(leaf, nodes["value"], 0.0)],
+    }
+
+
+def continued(
+    stored: dict[str, Any],
+    told: list[dict[str, float]],
+    right: NDArray[np.bool_],
+    weight: NDArray[np.float64],
+) -> dict[str, Any]:
+    """Stored trees (`plain`) with more of them behind, fitted to answers that the first ones say too little of.
+
+    What the first ones learned of other answers stays. Newton steps on the log-loss, each a shallow tree, monotone as
+    `SPEAKS` says.
+    """
+    from sklearn.tree import DecisionTreeRegressor
+
+    names = list(SPEAKS)
+    first = _renamed(stored, names)
+    known = Boosted.read(first)
+    X = np.array([[row[name] for name in names] for row in told])
+    log_odds = np.array([known(row) for row in told])
+    trees = []
+    for _ in range(MORE):
+        p = 1.0 / (1.0 + np.exp(-log_odds))
+        slope, curve = right - p, np.maximum(p * (1.0 - p), 1e-3)
+        tree = DecisionTreeRegressor(
+            max_depth=DEPTH,
+            min_samples_leaf=LEAF,
+            monotonic_cst=list(SPEAKS.values()),
+            random_state=0,
+        ).fit(X, slope / curve, sample_weight=weight * curve)
+        log_odds = log_odds + RATE * tree.predict(X)
+        trees.append(_plain_tree(tree.tree_))
+    return {**first, "trees": [*first["trees"], *trees]}
+
+
+def _renamed(stored: dict[str, Any], names: list[str]) -> dict[str, Any]:
+    # The same trees with their questions numbered by `names`.
+    row = np.array([names.index(name) for name in stored["names"]])
+    trees = [{**tree, "feature": row[tree["feature"]].tolist()} for tree in stored["trees"]]
+    return {**stored, "names": names, "trees": trees}
+
+
+def _plain_tree(tree: Any) -> dict[str, list[float]]:
+    leaf = tree.children_left < 0
+    value = RATE * tree.value[:, 0, 0]
+    return {
+        "feature": np.where(leaf, 0, tree.feature).tolist(),
+        "threshold": np.where(leaf, 0.0, tree.threshold).tolist(),
+        "left": np.where(leaf, -1, tree.children_left).tolist(),
+        "right": np.where(leaf, -1, tree.children_right).tolist(),
+        "value": [float(f"{x:.6g}") for x in np.where(leaf, value, 0.0)],
     }

@@ -3,30 +3,33 @@
 
     python -m benchmarks.verdict_weights gather --rows runs/evidence.jsonl --pairs 40
     python -m benchmarks.verdict_weights fit --rows runs/evidence.jsonl --write hybridreg/verdict
+    python -m benchmarks.verdict_weights continue --rows runs/evidence.jsonl --write hybridreg/verdict
 
 `gather` writes one line for each answer (`benchmarks.verdict_answers`): its evidence, that of its best rival, that of
 all poses that were found, and what is right. `fit` prints how the rules do on pairs that they were not fitted to
-(five-fold), and writes them.
+(five-fold), and writes them. `continue` leaves the support and the trees as they are and adds trees for what these
+answers say beside: new kinds of input, new evidence.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.boosting import boost, plain
+from benchmarks.boosting import boost, continued, plain
 from benchmarks.calibration import draw
 from benchmarks.verdict_answers import TIERS, Row, gather, read
 from hybridreg.verdict.boosted import Boosted
-from hybridreg.verdict.confidence import NO_RIVAL, OK, believed, features
-from hybridreg.verdict.support import terms
+from hybridreg.verdict.confidence import NO_RIVAL, OK, confidence, features
+from hybridreg.verdict.support import model, terms
 
 Array = NDArray[np.float64]
 # Penalty on the squared weights of the standardised terms, per answer.
@@ -91,20 +94,30 @@ def _with_support(rows: list[Row], weights: dict[str, float], intercept: float) 
         yield {**row["evidence"], "support": own, "rival_margin": rival[0] - own if rival else NO_RIVAL}
 
 
+def longer(rows: list[Row]) -> Rule:
+    """The shipped rule with more trees, fitted to these rows."""
+    weights, intercept = model()
+    told = [features(evidence) for evidence in _with_support(rows, weights, intercept)]
+    right, weight = np.array([row["right"] for row in rows]), np.array([row["weight"] for row in rows])
+    shipped = json.loads(files("hybridreg.verdict").joinpath("confidence.json").read_text())
+    stored = continued(shipped, told, right, weight)
+    return Rule(weights, intercept, Boosted.read(stored), stored)
+
+
 def predicted(rows: list[Row], rule: Rule) -> Array:
     """Probability of each row under a rule."""
-    told = [features(evidence) for evidence in _with_support(rows, rule.weights, rule.intercept)]
-    return np.array([believed(rule.trees(row), row["rival_margin"]) for row in told])
+    told = _with_support(rows, rule.weights, rule.intercept)
+    return np.array([confidence(evidence, rule.trees) for evidence in told])
 
 
-def unseen(rows: list[Row], folds: int = 5) -> Array:
-    """Probability of each row under the rule fitted to the other pairs."""
+def unseen(rows: list[Row], fitted: Callable[[list[Row]], Rule], folds: int = 5) -> Array:
+    """Probability of each row under the rule `fitted` to the other pairs."""
     names = sorted({row["pair"] for row in rows})
     fold = dict(zip(names, np.random.default_rng(0).permutation(len(names)) % folds, strict=True))
     its = np.array([fold[row["pair"]] for row in rows])
     p = np.zeros(len(rows))
     for k in range(folds):
-        rule = fit([row for row, f in zip(rows, its, strict=True) if f != k])
+        rule = fitted([row for row, f in zip(rows, its, strict=True) if f != k])
         p[its == k] = predicted([row for row, f in zip(rows, its, strict=True) if f == k], rule)
     return p
 
@@ -126,7 +139,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("what", choices=["gather", "fit"])
+    parser.add_argument("what", choices=["gather", "fit", "continue"])
     parser.add_argument("--rows", type=Path, default=Path("runs/evidence.jsonl"))
     parser.add_argument("--pairs", type=int, default=40, help="of each tier")
     parser.add_argument("--workers", type=int, default=2)
@@ -137,17 +150,20 @@ def main() -> None:
         gather(options.rows, options.pairs, options.workers)
         return
     rows = read(options.rows)
-    p = unseen(rows)
+    fitted = longer if options.what == "continue" else fit
+    p = unseen(rows, fitted)
     report(rows, p)
     if options.picture:
         draw(p, np.array([row["right"] for row in rows]), options.picture)
-    rule = fit(rows)
+    rule = fitted(rows)
     support = {
         "weights": {k: float(f"{w:.4g}") for k, w in rule.weights.items()},
         "intercept": round(rule.intercept, 3),
     }
     print(json.dumps(support, indent=2))
-    if options.write:
+    if options.write and options.what == "continue":
+        (options.write / "confidence.json").write_text(json.dumps(rule.stored_trees) + "\n")
+    elif options.write:
         (options.write / "support.json").write_text(json.dumps(support, indent=2) + "\n")
         (options.write / "confidence.json").write_text(json.dumps(rule.stored_trees) + "\n")
 
