@@ -40,8 +40,12 @@ def size_ratio(pair: Pair) -> float:
 def explanations(scene: Scene) -> list[str]:
     """Sentences for the mistakes under which the clouds fit beyond doubt: at most one."""
     for side, factors, sentence in _changes(scene.pair):
-        changed = _changed(getattr(scene.pair, side), factors)
-        if _fits(replace(scene.pair, image=None, **{side: changed})):
+        pair = replace(scene.pair, image=None)
+        if side == "source":
+            pair = replace(pair, source=_changed(pair.source, factors))
+        else:
+            pair = replace(pair, target=_changed(pair.target, factors))
+        if _fits(pair):
             return [sentence]
     return []
 

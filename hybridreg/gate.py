@@ -69,7 +69,7 @@ def finite(points: Array, name: str, *, drop: bool) -> tuple[Array, NDArray[np.b
     every = np.isfinite(points)
     if every.all():
         return points, None
-    good = every.all(axis=1)
+    good: NDArray[np.bool_] = np.asarray(every.all(axis=1))
     n_bad = len(points) - int(good.sum())
     if not drop:
         raise ValueError(

@@ -97,9 +97,10 @@ def closeness(scene: Scene, T_target_source: Array, every: int = 1) -> float:
 
     def look() -> float:
         source, target = fine_surfaces(scene)
+        back: Array = np.linalg.inv(T_target_source).astype(np.float64)  # of a pose with a size too
         return max(
             _one_way(source.asked[::every], target, T_target_source),
-            _one_way(target.asked[::every], source, np.linalg.inv(T_target_source)),
+            _one_way(target.asked[::every], source, back),
         )
 
     return scene.shared(("verdict", "closeness", every, T_target_source.tobytes()), look)
