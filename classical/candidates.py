@@ -14,6 +14,7 @@ from hybridreg import fitting, spec
 from hybridreg.classical import mistakes
 from hybridreg.classical.nothing import NoOverlap
 from hybridreg.matches import Correspondences, Pose
+from hybridreg.resolution import comparable, size_ratio
 from hybridreg.scene import Scene
 from hybridreg.stage import Stage
 from hybridreg.verdict import matched, rivals, support, weigh
@@ -26,6 +27,8 @@ Array = NDArray[np.float64]
 Entry = Mapping[str, Any]
 
 _SLOTS = ("overlap", "match", "estimate")
+# Confidence from which the user is believed to have made no mistake.
+_SURE = 0.99
 # Poses looked at of each entry: its own and the best of its rivals; how many of these are refined at most.
 _LOOKED_AT, _REFINED = 8, 2
 # The best poses of all, which are looked around when no entry brought certainty, unless their log-odds lie below this:
@@ -85,18 +88,17 @@ class Candidates(Stage):
             confidence = weigh(scene, rivals.as_pose(found)).confidence if found else 0.0
             if confidence >= self.enough:
                 break
-        if confidence < OK:
-            scene.explanations.extend(mistakes.explanations(scene))
+        if confidence < _SURE:
+            scene.explanations.extend(mistakes.explanations(scene, confidence))
         return rivals.as_pose(found) if found else Pose.unknown(len(matches))
 
     def _worth_trying(self, scene: Scene) -> Candidates:
-        # Between clouds of one place in one unit the reach differs tenfold at most.
-        ratio = mistakes.size_ratio(scene.pair)
-        if mistakes.COMPARABLE < ratio < 1.0 / mistakes.COMPARABLE:
+        source, target = scene.pair.source, scene.pair.target
+        if comparable(source, target):
             return self
-        scene.note(
-            f"one cloud reaches {max(ratio, 1.0 / ratio):.0f} times as far as the other: only one search was run"
-        )
+        ratio = size_ratio(source, target)
+        times = max(ratio, 1.0 / ratio)
+        scene.note(f"one cloud reaches {times:.0f} times as far as the other: only one search was run")
         return replace(self, of=self.of[:1])
 
     def stages(

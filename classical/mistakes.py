@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from hybridreg.classical.birdseye import BirdsEye
 from hybridreg.classical.voxel import VoxelGrid
 from hybridreg.cloud import PointCloud
-from hybridreg.extent import reach
 from hybridreg.matches import Correspondences
 from hybridreg.pair import Pair
+from hybridreg.resolution import comparable, size_ratio
 from hybridreg.scene import Scene
 from hybridreg.verdict import weigh
 from hybridreg.verdict.confidence import OK
@@ -23,36 +23,29 @@ Array = NDArray[np.float64]
 
 # Metres of one unit, and its name.
 _UNITS = ((0.001, "millimetres"), (0.01, "centimetres"), (0.3048, "feet"))
-# The shorter reach over the longer one below which no rigid pose is looked for at length.
-COMPARABLE = 1.0 / 25.0
 # Poses that are tried under a mistake: the right one is among the first where the clouds fit well.
 _TRIES = 10
 # Reaches of two clouds of one place, in one unit, differ by less than this factor more often than not.
 _ALIKE = 4.0
 
 
-def size_ratio(pair: Pair) -> float:
-    """Reach of the target over that of the source."""
-    source, target = (reach(cloud.radii) for cloud in (pair.source, pair.target))
-    return target / source if source > 0.0 and target > 0.0 else 1.0
-
-
-def explanations(scene: Scene) -> list[str]:
-    """Sentences for the mistakes under which the clouds fit beyond doubt: at most one."""
+def explanations(scene: Scene, confidence: float) -> list[str]:
+    """Sentences for the mistakes under which the clouds fit: at most one, of those that make them "ok" with no less
+    confidence than the pose that was found."""
     for side, factors, sentence in _changes(scene.pair):
         pair = replace(scene.pair, image=None)
         if side == "source":
             pair = replace(pair, source=_changed(pair.source, factors))
         else:
             pair = replace(pair, target=_changed(pair.target, factors))
-        if _fits(pair):
+        if _fit(pair) >= max(OK, confidence):
             return [sentence]
     return []
 
 
 def _changes(pair: Pair) -> Iterator[tuple[str, Array, str]]:
     # Cloud, what its coordinates are multiplied by, and the sentence.
-    ratio = size_ratio(pair)
+    ratio = size_ratio(pair.source, pair.target)
     for metres, unit in _UNITS:
         for factor, side in ((metres, "source"), (1.0 / metres, "target")):
             off = abs(np.log(ratio / factor))
@@ -62,7 +55,7 @@ def _changes(pair: Pair) -> Iterator[tuple[str, Array, str]]:
                     np.full(3, metres),
                     f"the clouds fit when the {side} is taken to be in {unit}: multiply its coordinates by {metres:g}",
                 )
-    if COMPARABLE < ratio < 1.0 / COMPARABLE:
+    if comparable(pair.source, pair.target):
         yield (
             "source",
             np.array([1.0, -1.0, 1.0]),
@@ -75,7 +68,7 @@ def _changed(cloud: PointCloud, factors: Array) -> PointCloud:
     return PointCloud(points=cloud.points * factors, said=seen._replace(places=seen.places * factors))
 
 
-def _fits(pair: Pair) -> bool:
+def _fit(pair: Pair) -> float:
     scene = VoxelGrid()(pair)
     pose = BirdsEye(tries=_TRIES)(scene, Correspondences.none(), np.random.default_rng(0))
-    return pose.found and weigh(scene, pose).confidence >= OK
+    return weigh(scene, pose).confidence if pose.found else 0.0

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybridreg.pair import Pair
-from hybridreg.resolution import default_voxel
+from hybridreg.resolution import comparable, default_voxel
 from hybridreg.scene import Level, Scene
 from hybridreg.stage import Stage
 
@@ -49,6 +49,8 @@ class VoxelGrid(Stage):
 
     def __call__(self, pair: Pair) -> Scene:
         clouds = (pair.source, pair.target)
+        if self.voxel is None and not comparable(*clouds):
+            return _each_by_itself(pair)
         voxel = self.voxel or default_voxel(pair.source, pair.target)
         reached = voxel
         points = [voxel_centroids(cloud.points, voxel) for cloud in clouds]
@@ -76,6 +78,21 @@ class VoxelGrid(Stage):
                 + (f" ({reached:.3g} m) and the number of points" if voxel > reached else "")
             )
         return scene
+
+
+def _each_by_itself(pair: Pair) -> Scene:
+    # One length for a cloud in millimetres and one in metres would leave nothing of the second.
+    levels = []
+    for cloud in (pair.source, pair.target):
+        voxel = default_voxel(cloud, cloud)
+        levels.append(
+            Level(points=voxel_centroids(cloud.points, voxel), spacing=voxel, viewpoint=cloud.viewpoint)
+        )
+    scene = Scene(pair=pair, source=levels[0], target=levels[1])
+    scene.note(
+        f"voxels {levels[0].spacing:.3g} and {levels[1].spacing:.3g} m, as the clouds' reaches are so unlike"
+    )
+    return scene
 
 
 def _two_digits_up(length: float) -> float:

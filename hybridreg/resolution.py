@@ -18,6 +18,8 @@ _CELLS_ALONG_REACH = 60.0
 # Cell of a map seen from above: metres outdoors; in a room, so many along the distance within which nearly all points
 # lie.
 _MAP_CELL, _CELLS_ALONG_MAP, _NEARLY_ALL = 0.5, 60.0, 0.99
+# Of the reaches of two sensors at one place the longer is seldom ten times the shorter.
+_MOST_RATIO = 25.0
 # What counts as right is no more than this share of the shorter reach: half a metre says nothing about a small thing.
 _OF_REACH = 0.04
 
@@ -37,6 +39,17 @@ def map_cell(source: PointCloud, target: PointCloud) -> float:
     """Cell in which a pair is seen from above, metres: half a metre outdoors, less in rooms."""
     longer = max(share_within(cloud.radii, _NEARLY_ALL) for cloud in (source, target))
     return min(_MAP_CELL, float(f"{longer / _CELLS_ALONG_MAP:.2g}")) or _MAP_CELL
+
+
+def size_ratio(source: PointCloud, target: PointCloud) -> float:
+    """Reach of the target over that of the source; 1 where one has none."""
+    a, b = reach(source.radii), reach(target.radii)
+    return b / a if a > 0.0 and b > 0.0 else 1.0
+
+
+def comparable(source: PointCloud, target: PointCloud) -> bool:
+    """Whether two clouds may show one place in one unit: their reaches differ by less than 25 times."""
+    return 1.0 / _MOST_RATIO < size_ratio(source, target) < _MOST_RATIO
 
 
 class Tolerance(NamedTuple):

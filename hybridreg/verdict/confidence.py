@@ -27,7 +27,7 @@ NEARLY = float(np.log(OK / (1.0 - OK)))
 NO_RIVAL = -20.0
 # No more is believed of a pose that turns the world over, nor of one at which the source fits better by so many nats
 # per point at another size (of some 400 right training answers none gained 0.08).
-_OVERTURNED, _RESIZED, SIZE_GAIN = 0.3, 0.9, 0.12
+_OVERTURNED, DOUBTED, SIZE_GAIN = 0.3, 0.9, 0.12
 # Log-odds by which a rival may do better and still be as good.
 _EQUAL = 1.0
 # What speaks for a pose (+1) or against it (-1) the more there is of it; nought may do either.
@@ -73,7 +73,7 @@ def confidence(evidence: Mapping[str, float], rule: Boosted | None = None) -> fl
         probability = FAILED
     if evidence["overturned"]:
         return min(probability, _OVERTURNED)
-    return min(probability, _RESIZED) if told["size_gain"] > SIZE_GAIN else probability
+    return min(probability, DOUBTED) if told["size_gain"] > SIZE_GAIN else probability
 
 
 def _one_of_two(told: Mapping[str, float], rule: Boosted) -> bool:

@@ -14,7 +14,7 @@ from hybridreg.scene import Scene
 from hybridreg.verdict import matched, rivals, support, views
 from hybridreg.verdict.agreement import Agreement, OneWay
 from hybridreg.verdict.closeness import closeness
-from hybridreg.verdict.confidence import NEARLY, NO_RIVAL, Word, confidence, word
+from hybridreg.verdict.confidence import DOUBTED, NEARLY, NO_RIVAL, Word, confidence, word
 from hybridreg.verdict.information import Information
 from hybridreg.verdict.rivals import Rival
 from hybridreg.verdict.similarity import Size, size
@@ -83,6 +83,8 @@ def judge(scene: Scene, pose: Pose, matches: Correspondences) -> Judgement:
     weighed = weigh(scene, pose)
     evidence = {**weighed.evidence, "matches_agreeing": float(matched.agreeing(scene, matches, pose.T))}
     probability = weighed.confidence if pose.found else 0.0
+    if scene.explanations:
+        probability = min(probability, DOUBTED)
     return Judgement(
         verdict=word(probability),
         confidence=probability,
