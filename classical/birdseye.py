@@ -65,6 +65,8 @@ class BirdsEye(Stage):
         Largest distance between the sensors along the ground, in voxels.
     tries : int
         Poses settled and ranked, at most.
+    again : bool
+        Look a second and a third time, with other spectra, where no pose is plain at first.
     """
 
     vertical: Literal["ground", "sensor"] = "ground"
@@ -72,6 +74,7 @@ class BirdsEye(Stage):
     layers: tuple[float, ...] = (0.6, 2.0, 4.0, 8.0, 20.0)
     farthest: float = 120.0
     tries: int = 40
+    again: bool = True
 
     def __post_init__(self) -> None:
         if self.vertical not in ("ground", "sensor"):
@@ -103,7 +106,7 @@ class BirdsEye(Stage):
             return []
         T_target_level = se3.inverse(T_level_target)
         found: list[Rival] = []
-        for levelled in _LEVELLED:
+        for levelled in _LEVELLED[: None if self.again else 1]:
             poses = [
                 T_target_level @ M @ T_level_source for M in self._planar(source, target, voxel, levelled)
             ]
@@ -112,8 +115,8 @@ class BirdsEye(Stage):
                 found.sort(key=lambda rival: -rival.support)
                 if found and found[0].support >= plain:
                     return found
-        if not found:
-            return []
+        if not found or not self.again:
+            return found
         # Levelled by the best pose, both clouds lie truer than by their grounds.
         T_level_source = _centred(T_level_target @ found[0].T, centre(own.source))
         again = self._slid(self._view(own, "source", T_level_source, voxel), target, voxel)

@@ -70,5 +70,5 @@ def _changed(cloud: PointCloud, factors: Array) -> PointCloud:
 
 def _fit(pair: Pair) -> float:
     scene = VoxelGrid()(pair)
-    pose = BirdsEye(tries=_TRIES)(scene, Correspondences.none(), np.random.default_rng(0))
+    pose = BirdsEye(tries=_TRIES, again=False)(scene, Correspondences.none(), np.random.default_rng(0))
     return weigh(scene, pose).confidence if pose.found else 0.0
