@@ -29,15 +29,15 @@ def overturned(source: View, target: View, T_target_source: Array) -> bool:
 
 
 def _under(a: View, b: View, T_b_a: Array) -> bool:
-    if b.ground is None:
+    # A sensor whose cloud shows no ground, or one on the wrong side of it, may not stand where it is taken to.
+    if a.ground is None or b.ground is None:
         return False
     place, other = se3.apply(T_b_a, a.centre[None])[0], b.centre
     slack = _THICK * b.thickness + _SLOPE * float(np.linalg.norm(place - other))
-    cosine = 1.0 if a.ground is None else float(b.ground.up @ T_b_a[:3, :3] @ a.ground.up)
-    height = float(b.ground.above(place[None])[0])
+    cosine = float(b.ground.up @ T_b_a[:3, :3] @ a.ground.up)
     if cosine > _ALIKE:
-        return a.image is not None and height < -slack
-    if cosine > _APART or a.ground is None:
+        return a.image is not None and float(b.ground.above(place[None])[0]) < -slack
+    if cosine > _APART:
         return False
     # The foot of one sensor on its own ground, turned over, against the other ground: a ceiling taken for a ground lies
     # a storey away.

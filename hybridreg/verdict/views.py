@@ -109,10 +109,19 @@ def _view(scene: Scene, side: Side, wanted: float, on_grid: Scene) -> View:
         asked=asked,
         settling=balanced(surface, _N_ASKED),
         relief=_relief(scene, side, on_grid),
-        ground=ground.find(on_grid, side) if scene.pair.gravity == "known" else None,
+        ground=_upright_ground(on_grid, side) if scene.pair.gravity == "known" else None,
         thickness=ground.thickness(points, wanted),
         centre=centre(level),
     )
+
+
+def _upright_ground(on_grid: Scene, side: Side) -> Ground | None:
+    # Its upper side is that of the sensor; where nobody said where that stood, of what stands on it too.
+    found, level = ground.find(on_grid, side), getattr(on_grid, side)
+    if found is None or level.viewpoint is None or getattr(on_grid.pair, side).said is not None:
+        return found
+    by_content = ground.under(level.points, None, level.spacing)
+    return found if by_content is not None and float(by_content.up @ found.up) > 0.5 else None
 
 
 def _relief(scene: Scene, side: Side, on_grid: Scene) -> Relief | None:
