@@ -47,7 +47,9 @@ def test_kept_features_train_the_same_heads(
     (kept, known), (fresh, nothing) = runs
     assert known[-1] == 2  # both pairs, each computed once
     assert set(nothing) == {0}
-    assert kept == pytest.approx(fresh, rel=5e-3)  # half precision
+    # Half precision before the first step; each step of the optimiser then makes more of it, on some processors 0.7 %.
+    assert kept[0] == pytest.approx(fresh[0], rel=2e-3)
+    assert kept == pytest.approx(fresh, rel=2e-2)
 
 
 def test_the_backbone_stays(make_recipe: MakeRecipe, cache: Path, tmp_path: Path) -> None:
