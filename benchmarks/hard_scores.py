@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What `register` says of the hard kinds: `python -m benchmarks.hard.scores --seeds 101,103 --workers 2`.
+"""What `register` says of the hard kinds: `python -m benchmarks.hard_scores --seeds 101,103 --workers 2`.
 
 Odd seeds take no part in any fit. Prints one line a kind and appends one JSON line a pair to `--out`.
 """
