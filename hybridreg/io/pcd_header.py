@@ -31,9 +31,7 @@ class PcdHeader:
     points: int
     encoding: str
     body: int  # the first byte after the header
-    viewpoint: (
-        tuple[float, float, float] | None
-    )  # where the sensor stood; None where the header says nothing of it
+    viewpoint: tuple[float, float, float] | None  # the sensor's place; None where the header does not tell
 
     @property
     def sizes(self) -> tuple[int, ...]:

@@ -3,7 +3,7 @@
 
 Along a corridor many poses bring walls onto walls within a surface's tolerance. At the right one the points lie on them
 to a centimetre or two, those on door frames and kerbs too; at a wrong one some centimetres beside. That takes surfaces
-as fine as the clouds show them, so it is asked only where several poses explain the data.
+as fine as the clouds show them; their normals are found where a pose asks for them.
 """
 
 from __future__ import annotations

@@ -34,8 +34,8 @@ _QUICK, _CLOSE, _ROUGHLY = 10, 2, 3
 _KEPT, _LEFT = 8, 12.0
 # Starts that are looked at again when no pose is certain.
 _AGAIN = 24
-# Support (log-odds) from which a pose is beyond doubt: twice that of "ok". Below it, poses that have so much less than
-# the best one are told apart by their closeness.
+# Support (log-odds) from which a pose is beyond doubt: twice that of "ok". Poses that have no more than so much less
+# than the best one are told apart by their closeness.
 BEYOND_DOUBT, _CONTENDS = 2.0 * NEARLY, 8.0
 
 

@@ -55,13 +55,17 @@ def settle(
     return descend(T, source.points[source.settling[::every]], target, steps)
 
 
-def descend(T: Array, points: Array, surfaces: Planes, steps: Iterable[tuple[float, float]]) -> Array:
+def descend(
+    T: Array, points: Array, surfaces: Planes, steps: Iterable[tuple[float, float]], *, sized: bool = False
+) -> Array:
     """Pose (4, 4) that steps of point-to-plane ICP reach from T, until too few `points` (n, 3) have a partner.
 
     Parameters
     ----------
     steps : pairs of float
         Farthest partner and width of the weights, metres, of each.
+    sized : bool
+        Fit the size too: the pose is a similarity then.
     """
     for reach, width in steps:
         moved = se3.apply(T, points)
@@ -70,20 +74,29 @@ def descend(T: Array, points: Array, surfaces: Planes, steps: Iterable[tuple[flo
         if np.count_nonzero(hit) < _FEWEST:
             return T
         row = np.asarray(match)[hit]
-        T = _step_onto(surfaces.points[row], surfaces.facing(row), moved[hit], width) @ T
+        T = _step_onto(surfaces.points[row], surfaces.facing(row), moved[hit], width, sized) @ T
     return T
 
 
-def _step_onto(planes: Array, normals: Array, points: Array, width: float) -> Array:
+def _step_onto(planes: Array, normals: Array, points: Array, width: float, sized: bool) -> Array:
     """Motion (4, 4) of one step of point-to-plane ICP that brings `points` (n, 3) nearer to `planes` through points
-    (n, 3) with `normals` (n, 3).
+    (n, 3) with `normals` (n, 3); `sized`, it makes them larger or smaller too.
 
     Cauchy weights of `width` metres: half of the neighbours of a wrong guess are no neighbours.
     """
     gap = np.einsum("ni,ni->n", points - planes, normals)
     weight = 1.0 / (1.0 + (gap / width) ** 2)
     centre = points.mean(axis=0)
-    J = jacobian(points - centre, normals)
+    arms = points - centre
+    J = jacobian(arms, normals)
+    if sized:
+        J = np.column_stack([J, np.einsum("ni,ni->n", arms, normals)])
     H = (J * weight[:, None]).T @ J
-    twist = -np.linalg.solve(H + 1e-6 * np.trace(H) * np.eye(6), J.T @ (weight * gap))
-    return se3.about(centre, se3.rotation_about(twist[:3]), twist[3:])
+    x = -np.linalg.solve(H + 1e-6 * np.trace(H) * np.eye(J.shape[1]), J.T @ (weight * gap))
+    step = se3.about(centre, se3.rotation_about(x[:3]), x[3:6])
+    if not sized:
+        return step
+    grow = np.eye(4)
+    grow[:3, :3] *= 1.0 + x[6]
+    grow[:3, 3] = -x[6] * centre
+    return step @ grow
