@@ -84,14 +84,15 @@ def _each_by_itself(pair: Pair) -> Scene:
     # One length for a cloud in millimetres and one in metres would leave nothing of the second.
     levels = []
     for cloud in (pair.source, pair.target):
-        voxel = default_voxel(cloud, cloud)
-        levels.append(
-            Level(points=voxel_centroids(cloud.points, voxel), spacing=voxel, viewpoint=cloud.viewpoint)
-        )
-    scene = Scene(pair=pair, source=levels[0], target=levels[1])
-    scene.note(
-        f"voxels {levels[0].spacing:.3g} and {levels[1].spacing:.3g} m, as the clouds' reaches are so unlike"
-    )
+        voxel = default_voxel(pair.source, pair.target)
+        points = voxel_centroids(cloud.points, voxel)
+        while len(points) > _MOST_POINTS:
+            voxel = _two_digits_up(voxel * (len(points) / _MOST_POINTS) ** 0.5)
+            points = voxel_centroids(cloud.points, voxel)
+        levels.append(Level(points=points, spacing=voxel, viewpoint=cloud.viewpoint))
+    source, target = levels
+    scene = Scene(pair=pair, source=source, target=target)
+    scene.note(f"voxels {source.spacing:.3g} and {target.spacing:.3g} m: the clouds' reaches are so unlike")
     return scene
 
 
