@@ -4,6 +4,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +14,7 @@ from scipy.spatial import cKDTree
 from hybridreg import limits
 from hybridreg.classical.voxel import voxel_centroids
 from hybridreg.matches import Correspondences, Pose
-from hybridreg.resources import n_threads
+from hybridreg.resources import n_threads, on_one_core
 from hybridreg.scene import Scene
 from hybridreg.stage import Stage
 
@@ -68,11 +70,7 @@ class KissMatcher(Stage):
         return Pose(T)
 
     def _at(self, scene: Scene, voxel: float) -> Array | None:
-        try:
-            import kiss_matcher
-        except ImportError as error:
-            raise ImportError(f'estimate="kiss" needs `pip install kiss-matcher` ({error})') from error
-
+        kiss_matcher = _wheel()
         # Its own voxel grid depends on the order of a race between threads; ours makes the result repeatable.
         source = voxel_centroids(scene.pair.source.points, voxel)
         target = voxel_centroids(scene.pair.target.points, voxel)
@@ -101,6 +99,22 @@ class KissMatcher(Stage):
         T = np.eye(4)
         T[:3, :3], T[:3, 3] = solution.rotation, np.ravel(solution.translation)
         return T if np.isfinite(T).all() else None
+
+
+@lru_cache(maxsize=1)
+def _wheel() -> Any:
+    try:
+        import kiss_matcher
+    except ImportError as error:
+        raise ImportError(f'estimate="kiss" needs `pip install kiss-matcher` ({error})') from error
+    # Its threads race, so that 1 match in 30 differed from the others. It counts the cores once in a process, at the
+    # first match; where that match sees one core, all of 600 later ones were the same (1.0.2, Linux).
+    points = np.random.default_rng(0).uniform(size=(3, 300))
+    with on_one_core():
+        kiss_matcher.KISSMatcher(kiss_matcher.KISSMatcherConfig(0.2, use_voxel_sampling=False)).match(
+            points, points
+        )
+    return kiss_matcher
 
 
 def _describable(points: Array, voxel: float) -> bool:

@@ -33,6 +33,20 @@ def n_workers() -> int:
     return n_threads() if n_threads() > 0 else os.cpu_count() or 1
 
 
+@contextmanager
+def on_one_core() -> Iterator[None]:
+    """Keep this thread, and those that it starts, on one core for the block, where the system can (Linux)."""
+    if not hasattr(os, "sched_setaffinity"):
+        yield
+        return
+    cores = os.sched_getaffinity(0)
+    os.sched_setaffinity(0, {min(cores)})
+    try:
+        yield
+    finally:
+        os.sched_setaffinity(0, cores)
+
+
 def reset_peak_memory() -> None:
     """Start counting peak memory anew, where the system can (Linux)."""
     try:

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -9,7 +10,7 @@ import numpy as np
 import pytest
 
 import hybridreg as hr
-from hybridreg import se3
+from hybridreg import se3, testing
 from hybridreg.matches import Correspondences
 from hybridreg.scene import Scene
 
@@ -86,3 +87,13 @@ def test_no_crash_reaches_the_user(kind: str, n: int) -> None:
     )
     assert done.returncode == 0, done.stderr
     assert "survived" in done.stdout
+
+
+@pytest.mark.skipif(
+    not hasattr(os, "sched_setaffinity"), reason="the wheel's threads can be held on Linux only"
+)
+def test_forty_calls_give_the_same_bits() -> None:
+    scene, _ = testing.sample_scene()
+    cores = os.sched_getaffinity(0)
+    assert len({run(scene).T.tobytes() for _ in range(40)}) == 1
+    assert os.sched_getaffinity(0) == cores
