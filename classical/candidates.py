@@ -36,8 +36,8 @@ _LOOKED_AT, _REFINED = 8, 2
 _LOOKED_AROUND, _LOST = 4, -7.0
 # Log-odds below which a settled pose is not refined, and by which its support may fall when it is refined.
 _HOPELESS, _NOISE = -3.0, 1.0
-# Log-odds above which a pose is moved to where more speaks for it, unless surfaces hold it by themselves: the least
-# information per point along any direction that they need for that.
+# Log-odds above which a pose is weighed, and moved to where more speaks for it, unless surfaces hold it by themselves:
+# the least information per point along any direction that they need for that.
 _LIKELY, _WEAK = 0.0, 0.01
 
 
@@ -85,7 +85,9 @@ class Candidates(Stage):
         found: list[Rival] = []
         confidence = 0.0
         for found in self._worth_trying(scene).stages(scene, matches, rng):
-            confidence = weigh(scene, rivals.as_pose(found)).confidence if found else 0.0
+            # To weigh a pose takes as long as to find some, and one that is rather wrong is not "ok".
+            likely = bool(found) and found[0].support > _LIKELY
+            confidence = weigh(scene, rivals.as_pose(found)).confidence if likely else 0.0
             if confidence >= self.enough:
                 break
         if confidence < _SURE:
@@ -116,12 +118,12 @@ class Candidates(Stage):
                 answers.append(offered)
                 found = _polished(scene, rivals.counted(scene, self._joined(scene, found, offered), answers))
             yield found
-        if found:
-            again = rivals.second_look(scene)
-            found = rivals.counted(scene, rivals.distinct(scene, [*found, *again]), answers)
+        if not found or found[0].support < rivals.HOPELESS:
+            return
+        found = rivals.counted(scene, rivals.distinct(scene, [*found, *rivals.second_look(scene)]), answers)
         hopeful = [one for one in found[:_LOOKED_AROUND] if one.support > _LOST]
         if hopeful:
-            near = rivals.distinct(scene, [hop(scene, one.T, last) for one in hopeful])
+            near = rivals.distinct(scene, hop(scene, np.array([one.T for one in hopeful]), last))
             yield _polished(scene, rivals.counted(scene, self._joined(scene, found, near), answers))
 
     def _joined(self, scene: Scene, found: list[Rival], offered: list[Rival]) -> list[Rival]:

@@ -18,6 +18,7 @@ from hybridreg.resolution import comparable, size_ratio
 from hybridreg.scene import Scene
 from hybridreg.verdict import weigh
 from hybridreg.verdict.confidence import OK
+from hybridreg.verdict.rivals import HOPELESS, seen_at
 
 Array = NDArray[np.float64]
 
@@ -71,4 +72,6 @@ def _changed(cloud: PointCloud, factors: Array) -> PointCloud:
 def _fit(pair: Pair) -> float:
     scene = VoxelGrid()(pair)
     pose = BirdsEye(tries=_TRIES, again=False)(scene, Correspondences.none(), np.random.default_rng(0))
-    return weigh(scene, pose).confidence if pose.found else 0.0
+    if not pose.found or seen_at(scene, [pose.T], 1)[0].support < HOPELESS:
+        return 0.0
+    return weigh(scene, pose).confidence

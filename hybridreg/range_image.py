@@ -17,6 +17,7 @@ from scipy.spatial import cKDTree
 
 from hybridreg.extent import radii
 from hybridreg.extent import reach as reach_of
+from hybridreg.resources import query_threads
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -118,7 +119,10 @@ class RangeImage:
         r = np.maximum(np.sqrt(np.einsum("ni,ni->n", ray, ray)), 1e-9)
         k = min(k, len(self.ranges))
         angle, index = self.tree.query(
-            ray / r[:, None], k=np.arange(1, k + 1), distance_upper_bound=1.5 * self.resolution
+            ray / r[:, None],
+            k=np.arange(1, k + 1),
+            distance_upper_bound=1.5 * self.resolution,
+            workers=query_threads(len(r)),
         )
         sideways = r[:, None] * angle
         asked = np.isfinite(angle) & (sideways <= reach)

@@ -10,6 +10,8 @@ from contextlib import contextmanager
 from pathlib import Path
 
 _PROCESS = Path("/proc/self")
+# Points of a query that are shared among threads.
+_MANY = 4_000
 
 
 @contextmanager
@@ -26,6 +28,11 @@ def n_threads() -> int:
     """Threads for one KD-tree query: what OMP_NUM_THREADS says, as numpy and OpenMP take it, else -1 for all."""
     said = os.environ.get("OMP_NUM_THREADS", "").partition(",")[0]
     return int(said) if said.isdigit() and int(said) > 0 else -1
+
+
+def query_threads(n: int) -> int:
+    """Threads for a KD-tree query of n points: to start them takes as long as to ask for a thousand points."""
+    return n_threads() if n > _MANY else 1
 
 
 def n_workers() -> int:

@@ -21,19 +21,20 @@ def from_rt(R: Array, t: Array) -> Array:
 
 
 def apply(T: Array, points: Array) -> Array:
-    """Move points (N, 3) by T (4, 4)."""
-    return points @ T[:3, :3].T + T[:3, 3]
+    """Move points (..., N, 3) by T (..., 4, 4)."""
+    return points @ np.swapaxes(T[..., :3, :3], -1, -2) + T[..., None, :3, 3]
 
 
 def inverse(T: Array) -> Array:
-    """Inverse of a rigid motion (4, 4)."""
-    R = T[:3, :3].T
-    return from_rt(R, -R @ T[:3, 3])
+    """Inverse of a rigid motion (..., 4, 4)."""
+    R = np.swapaxes(T[..., :3, :3], -1, -2)
+    return from_rt(R, -(R @ T[..., :3, 3:])[..., 0])
 
 
 def about(centre: Array, R: Array, shift: Array | float = 0.0) -> Array:
-    """Rigid motion (4, 4) that turns by R (3, 3) about a place (3,), and then moves it by `shift` (3,)."""
-    return from_rt(R, centre - R @ centre + shift)
+    """Rigid motion (..., 4, 4) that turns by R (..., 3, 3) about a place (..., 3), and then moves it by `shift`
+    (..., 3)."""
+    return from_rt(R, centre - (R @ centre[..., None])[..., 0] + shift)
 
 
 def exp(twist: Array) -> Array:
@@ -46,7 +47,7 @@ def exp(twist: Array) -> Array:
 
 
 def rotation_about(vector: Array) -> Array:
-    """Rotation (3, 3) about a vector (3,) whose length is the angle in radians."""
+    """Rotation (..., 3, 3) about a vector (..., 3) whose length is the angle in radians."""
     from scipy.spatial.transform import Rotation
 
     R: Array = Rotation.from_rotvec(vector).as_matrix()

@@ -9,13 +9,14 @@ few surfaces that face along the street decide whether the clouds may slide.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hybridreg import se3
 from hybridreg.range_image import Seen
+from hybridreg.resources import query_threads
 from hybridreg.verdict.axes import faced, main_axes
 from hybridreg.verdict.relief import Alike, alike
 from hybridreg.verdict.upright import overturned
@@ -56,6 +57,10 @@ class OneWay:
     match: NDArray[np.int64]
     moved: Array
     normals: Array
+
+    def of(self, pose: int) -> OneWay:
+        """Of one of several poses, whose fields have a leading axis."""
+        return OneWay(**{field.name: getattr(self, field.name)[pose] for field in fields(self)})
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -98,46 +103,62 @@ class Agreement:
 
 
 def compare(source: View, target: View, T_target_source: Array, spacing: float, every: int = 1) -> Agreement:
-    """Evidence for one pose, from each cloud's asked points or from `every` so-many-th of them."""
+    """Evidence for one pose (4, 4), from each cloud's asked points or from `every` so-many-th of them."""
+    return compare_each(source, target, T_target_source[None], spacing, every)[0]
+
+
+def compare_each(
+    source: View, target: View, poses: Array, spacing: float, every: int = 1
+) -> list[Agreement]:
+    """The same for poses (b, 4, 4): on few points that takes a third of the time that one by one takes."""
     rows_source, rows_target = source.asked[::every], target.asked[::every]
-    forward = one_way(source, rows_source, target, T_target_source, spacing)
-    backward = one_way(target, rows_target, source, se3.inverse(T_target_source), spacing)
-    facing = (forward.normals, target.normals[rows_target])
+    forward = one_way(source, rows_source, target, poses, spacing)
+    backward = one_way(target, rows_target, source, se3.inverse(poses), spacing)
+    own = target.normals[rows_target]
+    facing = (forward.normals, np.broadcast_to(own, (len(poses), *own.shape)))
     axes = main_axes(*facing)
-    looked, agreed, through = np.zeros(3), np.zeros(3), np.zeros(3)
+    looked, agreed, through = np.zeros((3, len(poses), 3))
     for way, normals in zip((forward, backward), facing, strict=True):
         axis = faced(normals, axes)
-        for count, mask in ((looked, way.looked), (agreed, way.looked & way.agrees), (through, way.free)):
-            count += np.bincount(axis[mask], minlength=3)
-    return Agreement(
-        source=forward,
-        target=backward,
-        axes=axes,
-        looked=every * looked,
-        agreed=every * agreed,
-        through=every * through,
-        relief=alike(source.relief, target.relief, T_target_source, every),
-        overturned=overturned(source, target, T_target_source),
-    )
+        for k in range(3):
+            faces = axis == k
+            looked[:, k] += np.count_nonzero(faces & way.looked, axis=1)
+            agreed[:, k] += np.count_nonzero(faces & way.looked & way.agrees, axis=1)
+            through[:, k] += np.count_nonzero(faces & way.free, axis=1)
+    return [
+        Agreement(
+            source=forward.of(row),
+            target=backward.of(row),
+            axes=axes[row],
+            looked=every * looked[row],
+            agreed=every * agreed[row],
+            through=every * through[row],
+            relief=alike(source.relief, target.relief, T, every),
+            overturned=overturned(source, target, T),
+        )
+        for row, T in enumerate(poses)
+    ]
 
 
 def one_way(a: View, rows: NDArray[np.int64], b: View, T_b_a: Array, spacing: float) -> OneWay:
-    """Lay some rows of `a` on `b`."""
+    """Lay some rows (m,) of `a` on `b`, under each of some poses (b, 4, 4); the fields have a row for each pose."""
     moved = se3.apply(T_b_a, a.points[rows])
-    normals = a.normals[rows] @ T_b_a[:3, :3].T
+    normals = a.normals[rows] @ np.swapaxes(T_b_a[:, :3, :3], 1, 2)
     limit = _COVERED if b.image is not None else _SURROUNDED
-    distance, match = b.tree.query(moved, distance_upper_bound=limit * spacing)
+    threads = query_threads(moved.size // 3)
+    distance, match = b.tree.query(moved, distance_upper_bound=limit * spacing, workers=threads)
     covered: Mask = np.asarray(distance) < _COVERED * spacing
     row = np.where(covered, match, 0)
     other = b.normals[row]
-    across = np.abs(np.einsum("ni,ni->n", moved - b.points[row], other))
-    parallel = np.abs(np.einsum("ni,ni->n", normals, other)) > _SAME_NORMAL
+    across = np.abs(np.einsum("bni,bni->bn", moved - b.points[row], other))
+    parallel = np.abs(np.einsum("bni,bni->bn", normals, other)) > _SAME_NORMAL
     agrees = covered & (across < _ACROSS * spacing) & parallel
     if b.image is None:
         looked = np.isfinite(distance)
-        free = hidden = np.zeros(len(moved), dtype=bool)
+        free = hidden = np.zeros(looked.shape, dtype=bool)
     else:
-        state = b.image.look(moved, normals, margin=_MARGIN * spacing, reach=_REACH * spacing)
+        flat = moved.reshape(-1, 3), normals.reshape(-1, 3)
+        state = b.image.look(*flat, margin=_MARGIN * spacing, reach=_REACH * spacing).reshape(covered.shape)
         free, hidden = state == Seen.FREE, state == Seen.HIDDEN
         looked = free | (state == Seen.SEEN)
     return OneWay(

@@ -16,32 +16,34 @@ _SAMPLE = 1_000
 
 
 def main_axes(*facing: Array) -> Array:
-    """Three orthogonal directions (3, 3), rows, along which the normals of one or more clouds gather, the commonest
-    first; each cloud has the same say.
+    """Three orthogonal directions (..., 3, 3), rows, along which the normals (..., n, 3) of one or more clouds gather,
+    the commonest first; each cloud has the same say.
 
     Eigenvectors of the normals' scatter alone lie askew where two directions are equally common (the floor and the
     walls of a room). From there the sum of fourth powers of the normals' components is made as large as a rotation
     can, the fixed point that independent component analysis uses for kurtosis.
     """
-    facing = tuple(n[:: max(1, len(n) // _SAMPLE)] for n in facing)
-    normals = np.concatenate(facing)
-    weight = np.concatenate([np.full(len(n), 1.0 / len(n)) for n in facing])[:, None]
-    axes = np.linalg.eigh((weight * normals).T @ normals)[1].T
+    some = [n[..., :: max(1, n.shape[-2] // _SAMPLE), :] for n in facing]
+    normals = np.concatenate(some, axis=-2)
+    weight = np.concatenate([np.full(n.shape[-2], 1.0 / n.shape[-2]) for n in some])[:, None]
+    axes = np.swapaxes(np.linalg.eigh(np.swapaxes(weight * normals, -1, -2) @ normals)[1], -1, -2)
+    moving = np.ones(axes.shape[:-2], dtype=bool)
     for _ in range(_TURNS):
-        along = normals @ axes.T
-        U, _, Vt = np.linalg.svd(
-            (weight * (along * along * along)).T @ normals
-        )  # ** 3 takes five times as long
-        before, axes = axes, U @ Vt
-        if np.abs(axes - before).max() < _STILL:
+        along = normals @ np.swapaxes(axes, -1, -2)
+        cubed = weight * (along * along * along)  # ** 3 takes five times as long
+        U, _, Vt = np.linalg.svd(np.swapaxes(cubed, -1, -2) @ normals)
+        before, axes = axes, np.where(moving[..., None, None], U @ Vt, axes)
+        moving = np.abs(axes - before).max(axis=(-2, -1)) >= _STILL
+        if not moving.any():
             break
-    share = np.bincount(faced(normals, axes), weights=weight[:, 0], minlength=3)
-    return axes[np.argsort(-share)]
+    nearest = faced(normals, axes)
+    share = np.stack([(weight[:, 0] * (nearest == axis)).sum(axis=-1) for axis in range(3)], axis=-1)
+    return np.take_along_axis(axes, np.argsort(-share, axis=-1)[..., None], axis=-2)
 
 
 def faced(normals: Array, axes: Array) -> Rows:
-    """Which of the axes (3, 3) each normal (n, 3) lies nearest to, (n,)."""
-    axis: Rows = np.argmax(np.abs(normals @ axes.T), axis=1)
+    """Which of the axes (..., 3, 3) each normal (..., n, 3) lies nearest to, (..., n)."""
+    axis: Rows = np.argmax(np.abs(normals @ np.swapaxes(axes, -1, -2)), axis=-1)
     return axis
 
 

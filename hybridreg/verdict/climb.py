@@ -44,14 +44,12 @@ def climb(scene: Scene, T_target_source: Array) -> Rival:
     middle = source.points.mean(axis=0)
     arm = float(np.quantile(np.linalg.norm(source.points - middle, axis=1), _ARM)) or spacing
 
-    def seen(T: Array) -> float:
-        return support.of(source, target, T, spacing, _EVERY)
-
-    T, best, step = T_target_source, seen(T_target_source), _FIRST
+    T, step = T_target_source, _FIRST
+    best = support.of(source, target, T, spacing, _EVERY)
     for _ in range(_ROUNDS):
         for motions in _NEIGHBOURS:
-            around = [_moved(T, middle, m, step * spacing, along, up, arm) for m in motions]
-            values = [seen(one) for one in around]
+            around = np.array([_moved(T, middle, m, step * spacing, along, up, arm) for m in motions])
+            values = support.of_each(source, target, around, spacing, _EVERY)
             highest = int(np.argmax(values))
             if values[highest] > best:
                 T, best = around[highest], values[highest]

@@ -17,7 +17,7 @@ from hybridreg.resolution import map_cell
 from hybridreg.scene import Scene
 from hybridreg.verdict import support, views
 from hybridreg.verdict.closeness import closeness, settle_closely
-from hybridreg.verdict.rivals import Rival
+from hybridreg.verdict.rivals import Rival, seen_at
 from hybridreg.verdict.settle import settle
 
 Array = NDArray[np.float64]
@@ -29,29 +29,29 @@ _HOPS, _TURN_DEG, _SHIFTS, _LEAST = 10, 3.0, (1.0, 4.0), 0.3
 _SETTLING, _LOOKING, _CLOSELY = 3, 3, 4
 
 
-def hop(scene: Scene, T_target_source: Array, rng: np.random.Generator) -> Rival:
-    """Where basin hopping (Wales and Doye 1997) for more support ends that begins at a pose (4, 4).
+def hop(scene: Scene, poses: Array, rng: np.random.Generator) -> list[Rival]:
+    """Where basin hopping (Wales and Doye 1997) for more support ends that begins at each of some poses (b, 4, 4).
 
-    The pose is shaken, settles anew, roughly and closely, and stays where it has more support and lies closer.
+    A pose is shaken, settles anew, roughly and closely, and stays where it has more support and lies closer.
     """
     source, target = views.views(scene)
     spacing = views.spacing(scene)
     middle = source.points.mean(axis=0)
     step = max(spacing, _LEAST * map_cell(scene.pair.source, scene.pair.target))
 
-    def seen(T: Array) -> float:
-        close = closeness(scene, T, _CLOSELY)
-        return support.of(source, target, T, spacing, _LOOKING) + support.beside(0.0, close)
+    def seen(poses: Array) -> Array:
+        close = [support.beside(0.0, closeness(scene, T, _CLOSELY)) for T in poses]
+        return np.array(support.of_each(source, target, poses, spacing, _LOOKING)) + close
 
-    T, best = T_target_source, seen(T_target_source)
+    poses, best = poses.copy(), seen(poses)
     for _, shift in zip(range(_HOPS), cycle(_SHIFTS), strict=False):
-        start = _shaken(T, middle, shift * step, rng)
-        roughly = settle(source, target, start, spacing, every=_SETTLING)
+        starts = np.array([_shaken(T, middle, shift * step, rng) for T in poses])
+        roughly = settle(source, target, starts, spacing, every=_SETTLING)
         for settled in (roughly, settle_closely(scene, roughly)):
             value = seen(settled)
-            if value > best:
-                T, best = settled, value
-    return Rival(T, support.of(source, target, T, spacing))
+            better = value > best
+            poses[better], best[better] = settled[better], value[better]
+    return seen_at(scene, poses, 1)
 
 
 def _shaken(T: Array, middle: Array, shift: float, rng: np.random.Generator) -> Array:

@@ -79,5 +79,6 @@ def measure(agreement: Agreement, target: View) -> Information:
 
 
 def jacobian(arms: Array, normals: Array) -> Array:
-    """Derivatives (n, 6) of point-to-plane distances by a small rotation and a translation; `arms` from the centre."""
-    return np.concatenate([np.cross(arms, normals), normals], axis=1)
+    """Derivatives (..., 6) of point-to-plane distances by a small rotation and a translation; `arms` (..., 3) from the
+    centre."""
+    return np.concatenate([np.cross(arms, normals), normals], axis=-1)

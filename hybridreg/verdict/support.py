@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from hybridreg.scene import Scene
 from hybridreg.verdict import information, views
-from hybridreg.verdict.agreement import FEW, Agreement, compare
+from hybridreg.verdict.agreement import FEW, Agreement, compare, compare_each
 from hybridreg.verdict.information import Information
 from hybridreg.verdict.relief import nats
 from hybridreg.verdict.views import View
@@ -28,6 +28,8 @@ _UNHELD = 1e-4
 _NOTHING = 0.02
 # Log-odds that a pose loses which turns the world over: by hand, as no evidence makes up for it.
 _OVERTURNED = 20.0
+# Points laid on the other cloud at once.
+_AT_ONCE = 20_000
 # Nats of the relief that are believed at most; beyond all doubt already.
 _TOLD = 1000.0
 
@@ -140,5 +142,14 @@ def share(part: Mask, whole: Mask) -> float:
 
 def of(source: View, target: View, T_target_source: Array, spacing: float, every: int = 1) -> float:
     """Support of a pose (4, 4) by the surfaces alone, from `every` so-many-th of the asked points."""
-    agreement = compare(source, target, T_target_source, spacing, every=every)
-    return support(numbers(agreement, information.measure(agreement, target)))
+    return of_each(source, target, T_target_source[None], spacing, every)[0]
+
+
+def of_each(source: View, target: View, poses: Array, spacing: float, every: int = 1) -> list[float]:
+    """The same for poses (b, 4, 4), so many at once that their points fit in a processor's cache."""
+    some = max(1, _AT_ONCE * every // max(1, len(source.asked) + len(target.asked)))
+    return [
+        support(numbers(agreement, information.measure(agreement, target)))
+        for first in range(0, len(poses), some)
+        for agreement in compare_each(source, target, poses[first : first + some], spacing, every=every)
+    ]

@@ -43,7 +43,7 @@ def test_a_pose_that_rests_beside_the_right_one_leaves_for_it(street: tuple[Scen
     scene, truth = street
     start = started(scene, truth)
     assert wrong_by(start, truth)[1] > 0.5
-    degrees, metres = wrong_by(hop(scene, start, np.random.default_rng(0)).T, truth)
+    degrees, metres = wrong_by(hop(scene, start[None], np.random.default_rng(0))[0].T, truth)
     assert degrees < 1.5
     assert metres < 0.4
 
@@ -52,7 +52,7 @@ def test_support_and_closeness_are_no_less_than_before(street: tuple[Scene, np.n
     scene, truth = street
     source, target = views.views(scene)
     start = started(scene, truth)
-    end = hop(scene, start, np.random.default_rng(1))
+    (end,) = hop(scene, start[None], np.random.default_rng(1))
     before, after = (
         support.of(source, target, T, views.spacing(scene), every=3)
         + support.beside(0.0, closeness(scene, T, 4))
@@ -64,5 +64,5 @@ def test_support_and_closeness_are_no_less_than_before(street: tuple[Scene, np.n
 
 def test_the_generator_decides_it(street: tuple[Scene, np.ndarray]) -> None:
     scene, truth = street
-    one, two = (hop(scene, started(scene, truth), np.random.default_rng(3)).T for _ in range(2))
+    one, two = (hop(scene, started(scene, truth)[None], np.random.default_rng(3))[0].T for _ in range(2))
     assert np.array_equal(one, two)
