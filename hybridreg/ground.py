@@ -20,6 +20,8 @@ Weights = NDArray[np.float64]
 # Half the thickness of the ground, as a plane follows uneven ground only so well: metres, yet no more than so much of
 # the cloud's reach (rooms), and no less than so many spacings.
 _THICK, _OF_REACH, _SPACINGS = 0.25, 0.03, 0.6
+# Metres: of points that all lie in one place the above are nought.
+_THIN = 1e-9
 # Triples of points tried; how many look best on few points; how many of these are fitted on all.
 _TRIPLES, _LOOKED_AT, _FITTED = 4000, 120, 6
 _FEW, _MANY = 160, 1500
@@ -110,7 +112,7 @@ def under(points: Array, viewpoint: Array | None, spacing: float) -> Ground | No
 
 def thickness(points: Array, spacing: float) -> float:
     """Half the thickness of a cloud's ground, metres: a plane follows uneven ground only so well."""
-    return max(_SPACINGS * spacing, min(_THICK, _OF_REACH * reach(radii(points))))
+    return max(_SPACINGS * spacing, min(_THICK, _OF_REACH * reach(radii(points))), _THIN)
 
 
 def _nearer_more(points: Array) -> Weights:

@@ -150,8 +150,8 @@ def counted(scene: Scene, found: Iterable[Rival], answers: Iterable[Iterable[Riv
 def told_apart(scene: Scene, found: Sequence[Rival]) -> list[Rival]:
     """The same poses in the same order, with their closeness where it may decide which of them is right."""
     best = max((one.support for one in found), default=0.0)
-    rows = [row for row, one in enumerate(found) if one.support > max(best - _CONTENDS, HOPELESS)]
-    if len(rows) < 2:
+    rows = [row for row, one in enumerate(found) if one.support > best - _CONTENDS]
+    if len(rows) < 2 or best < HOPELESS:
         return list(found)
     close = {row: closeness(scene, found[row].T) for row in rows}
     closest = max(close.values())
