@@ -91,7 +91,7 @@ class Candidates(Stage):
             if confidence >= self.enough:
                 break
         if confidence < _SURE:
-            scene.explanations.extend(mistakes.explanations(scene, confidence))
+            scene.explanations.extend(mistakes.explanations(scene))
         return rivals.as_pose(found) if found else Pose.unknown(len(matches))
 
     def _worth_trying(self, scene: Scene) -> Candidates:

@@ -30,16 +30,16 @@ _TRIES = 10
 _ALIKE = 4.0
 
 
-def explanations(scene: Scene, confidence: float) -> list[str]:
-    """Sentences for the mistakes under which the clouds fit: at most one, of those that make them "ok" with no less
-    confidence than the pose that was found."""
+def explanations(scene: Scene) -> list[str]:
+    """Sentences for the mistakes under which the clouds fit: at most one, of those that make them "ok", be the pose that
+    was found as likely: a room that is nearly its own mirror image tells neither."""
     for side, factors, sentence in _changes(scene.pair):
         pair = replace(scene.pair, image=None)
         if side == "source":
             pair = replace(pair, source=_changed(pair.source, factors))
         else:
             pair = replace(pair, target=_changed(pair.target, factors))
-        if _fit(pair) >= max(OK, confidence):
+        if _fit(pair) >= OK:
             return [sentence]
     return []
 

@@ -96,7 +96,7 @@ def test_a_map_that_holds_a_place_twice_shows_its_other_copy(crossing: Made) -> 
 
 
 def test_a_mirrored_source_is_named(crossing: Made) -> None:
-    told = mistakes.explanations(VoxelGrid()(changed(crossing, np.array([1.0, -1.0, 1.0]))), 0.5)
+    told = mistakes.explanations(VoxelGrid()(changed(crossing, np.array([1.0, -1.0, 1.0]))))
     assert told
     assert "mirror image" in told[0]
 
@@ -105,19 +105,19 @@ def test_a_mirrored_source_is_named(crossing: Made) -> None:
     "factor, unit", [(1000.0, "millimetres"), (100.0, "centimetres"), (1 / 0.3048, "feet")]
 )
 def test_another_unit_is_named_with_its_cloud(crossing: Made, factor: float, unit: str) -> None:
-    told = mistakes.explanations(VoxelGrid()(changed(crossing, factor)), 0.0)
+    told = mistakes.explanations(VoxelGrid()(changed(crossing, factor)))
     assert told
     assert f"the source is taken to be in {unit}" in told[0]
     pair = changed(crossing, factor)
-    told = mistakes.explanations(VoxelGrid()(Pair(source=pair.target, target=pair.source)), 0.0)
+    told = mistakes.explanations(VoxelGrid()(Pair(source=pair.target, target=pair.source)))
     assert told
     assert f"the target is taken to be in {unit}" in told[0]
 
 
 def test_a_right_pair_is_no_mistake(crossing: Made, elsewhere: Scene) -> None:
     assert comparable(crossing.scene.pair.source, crossing.scene.pair.target)
-    assert mistakes.explanations(crossing.scene, 0.999) == []
-    assert mistakes.explanations(elsewhere, 0.0) == []
+    assert mistakes.explanations(crossing.scene) == []
+    assert mistakes.explanations(elsewhere) == []
 
 
 def test_the_tolerance_follows_the_size_of_the_scene(crossing: Made) -> None:
