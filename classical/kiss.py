@@ -24,7 +24,7 @@ Array = NDArray[np.float64]
 # 225 crashes had no point with five neighbours within the radius of its normals; twice as much is asked for here.
 _SUPPORTED_POINTS, _NEIGHBOURS, _NORMAL_RADIUS = 10, 6, 3.0
 _FEWEST_MATCHES = 3
-_SMALLEST_VOXEL = 0.005  # below it the wheel raises RuntimeError
+_SMALLEST_VOXEL = 0.01  # metres; below half of it the wheel raises RuntimeError
 _LARGEST_NOISE = 0.999
 
 
@@ -43,11 +43,6 @@ class KissMatcher(Stage):
         Voxel in spacings of the levels.
     max_matches : int
         KISS-Matcher keeps at most so many initial matches.
-
-    Raises
-    ------
-    ValueError
-        When called: a voxel below 5 mm, which KISS-Matcher does not take.
     """
 
     voxel: float | None = None
@@ -76,11 +71,9 @@ class KissMatcher(Stage):
         target = voxel_centroids(scene.pair.target.points, voxel)
         if not (_describable(source, voxel) and _describable(target, voxel)):
             return None
-        if voxel < _SMALLEST_VOXEL:
-            raise ValueError(
-                f"KISS-Matcher works on voxels of {_SMALLEST_VOXEL} m and more, not of {voxel:.3g} m; give a larger "
-                "`voxel`, or the coordinates in another unit"
-            )
+        # What small things are measured in makes no difference to it, but for this limit.
+        magnified = max(1.0, _SMALLEST_VOXEL / voxel)
+        source, target, voxel = magnified * source, magnified * target, magnified * voxel
         # It clamps both noise bounds at a metre, and prints a warning where it does; so clamp before.
         config = kiss_matcher.KISSMatcherConfig(
             voxel,
@@ -97,7 +90,7 @@ class KissMatcher(Stage):
         if not solution.valid:
             return None
         T = np.eye(4)
-        T[:3, :3], T[:3, 3] = solution.rotation, np.ravel(solution.translation)
+        T[:3, :3], T[:3, 3] = solution.rotation, np.ravel(solution.translation) / magnified
         return T if np.isfinite(T).all() else None
 
 

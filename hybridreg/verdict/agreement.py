@@ -107,9 +107,7 @@ def compare(source: View, target: View, T_target_source: Array, spacing: float, 
     return compare_each(source, target, T_target_source[None], spacing, every)[0]
 
 
-def compare_each(
-    source: View, target: View, poses: Array, spacing: float, every: int = 1
-) -> list[Agreement]:
+def compare_each(source: View, target: View, poses: Array, spacing: float, every: int = 1) -> list[Agreement]:
     """The same for poses (b, 4, 4): on few points that takes a third of the time that one by one takes."""
     rows_source, rows_target = source.asked[::every], target.asked[::every]
     forward = one_way(source, rows_source, target, poses, spacing)

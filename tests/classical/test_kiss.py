@@ -32,6 +32,14 @@ def test_finds_the_courtyard_from_any_yaw(courtyard: tuple[hr.Pair, np.ndarray])
     assert np.linalg.norm(error[:3, 3]) < 1.0
 
 
+def test_small_things_are_found_as_large_ones(courtyard: tuple[hr.Pair, np.ndarray]) -> None:
+    pair, truth = courtyard
+    small = hr.Pair.of(pair.source.points / 500.0, pair.target.points / 500.0)
+    T = run(hr.VoxelGrid(voxel=0.4 / 500.0)(small)).T
+    assert np.linalg.norm(500.0 * T[:3, 3] - truth[:3, 3]) < 1.0
+    assert se3.angle_deg(T[:3, :3].T @ truth[:3, :3]) < 5.0
+
+
 def test_repeats_to_the_last_bit(courtyard_scene: tuple[Scene, np.ndarray]) -> None:
     scene = courtyard_scene[0]
     first = run(scene)
