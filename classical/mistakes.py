@@ -31,8 +31,10 @@ _ALIKE = 4.0
 
 
 def explanations(scene: Scene) -> list[str]:
-    """Sentences for the mistakes under which the clouds fit: at most one, of those that make them "ok", be the pose that
-    was found as likely: a room that is nearly its own mirror image tells neither."""
+    """Sentences for the mistakes under which the clouds fit: at most one, of those that make them "ok".
+
+    The pose that was found may be as likely: a room that is nearly its own mirror image tells neither.
+    """
     for side, factors, sentence in _changes(scene.pair):
         pair = replace(scene.pair, image=None)
         if side == "source":
