@@ -113,6 +113,11 @@ def _settled(scene: Scene, starts: Sequence[Array], every: int, looked_at: int) 
     return seen_at(scene, settled, looked_at)
 
 
+def highest(scene: Scene) -> float:
+    """Support of the best pose of the run; minus infinity before there is one."""
+    return max((one.support for one in _known(scene).values()), default=-np.inf)
+
+
 def _tried(scene: Scene) -> list[Rival]:
     # Every start of the run, roughly settled.
     return scene.shared(("verdict", "tried"), list)
