@@ -65,12 +65,22 @@ def require_memory(pyramid: Pyramid, config: NetworkConfig) -> None:
     ValueError
         The estimate exceeds what is free; the message names the points, both figures and the cure.
     """
-    needed, free = forward_bytes(pyramid, config), available_bytes(pyramid.points[0].device)
+    cure = f"use a network with a voxel larger than {config.backbone.voxel:g} m, or crop the clouds"
+    require_bytes(forward_bytes(pyramid, config), pyramid.lengths[0], pyramid.points[0].device, cure)
+
+
+def require_bytes(needed: int, lengths: tuple[int, int], device: torch.device | str, cure: str) -> None:
+    """Refuse what would not fit a device: so many bytes for so many target and source points.
+
+    Raises
+    ------
+    ValueError
+        As `require_memory`.
+    """
+    free = available_bytes(device)
     if free is None or needed <= free:
         return
-    target, source = pyramid.lengths[0]
     raise ValueError(
-        f"the network would take about {needed / 1e9:.2g} GB for {target} target and {source} source points, and "
-        f"{free / 1e9:.2g} GB are free: use a network with a voxel larger than {config.backbone.voxel:g} m, or "
-        "crop the clouds"
+        f"the network would take about {needed / 1e9:.2g} GB for {lengths[0]} target and {lengths[1]} source points, "
+        f"and {free / 1e9:.2g} GB are free: {cure}"
     )

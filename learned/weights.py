@@ -5,8 +5,9 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import Any, TypeVar
 
 import torch
 from safetensors import SafetensorError
@@ -22,6 +23,8 @@ from hybridreg.learned.network import RegistrationNetwork
 from hybridreg.learned.official_names import official_name
 from hybridreg.learned.sizes import named_config
 from hybridreg.shipped_weights import CONFIG_FILE, WEIGHTS_FILE, find, names
+
+Config = TypeVar("Config")
 
 
 def save_pretrained(
@@ -54,18 +57,44 @@ def from_pretrained(name_or_folder: str | os.PathLike[str]) -> RegistrationNetwo
     ValueError
         A file is damaged, or a tensor is missing, superfluous, of another shape or not finite: it is named.
     """
+    config, tensors, origin = read_folder(name_or_folder, None, NetworkConfig.from_dict)
+    network = RegistrationNetwork(config)
+    load_tensors(network, tensors, origin)
+    return network.eval()
+
+
+def read_folder(
+    name_or_folder: str | os.PathLike[str], network: str | None, build: Callable[[Mapping[str, Any]], Config]
+) -> tuple[Config, dict[str, Tensor], str]:
+    """Configuration and tensors of a folder, and what the tensors' file is called in messages.
+
+    Parameters
+    ----------
+    network
+        What ``config.json`` must say under "network"; None where it must have no such key.
+    build
+        Makes the configuration from plain values.
+
+    Raises
+    ------
+    FileNotFoundError, ValueError
+        As `from_pretrained`, and for the weights of another network.
+    """
     folder = _find(name_or_folder)
     try:
-        config = NetworkConfig.from_dict(read_json(folder / CONFIG_FILE))
+        values = read_json(folder / CONFIG_FILE)
+        found = values.get("network") if isinstance(values, dict) else None
+        config = build(values) if found == network else None
     except (ValueError, TypeError, ArithmeticError) as error:
         raise ValueError(f"{folder / CONFIG_FILE} is damaged: {error}") from error
+    if config is None:
+        held, wanted = (f"of {name}" if name else "without the key 'network'" for name in (found, network))
+        raise ValueError(f"{folder} holds weights {held}; wanted are weights {wanted}")
     try:
         tensors = load_file(folder / WEIGHTS_FILE)
     except SafetensorError as error:
         raise ValueError(f"{folder / WEIGHTS_FILE} is damaged: {error}") from error
-    network = RegistrationNetwork(config)
-    load_tensors(network, tensors, str(folder / WEIGHTS_FILE))
-    return network.eval()
+    return config, tensors, str(folder / WEIGHTS_FILE)
 
 
 def find_files(name_or_folder: str | os.PathLike[str]) -> list[Path]:
@@ -133,10 +162,15 @@ def load_official(
     return network.eval()
 
 
-def load_official_tensors(network: RegistrationNetwork, tensors: Mapping[str, Tensor], origin: str) -> None:
-    """Load tensors that bear the checkpoint's names, strictly."""
+def load_official_tensors(
+    network: nn.Module,
+    tensors: Mapping[str, Tensor],
+    origin: str,
+    naming: Callable[[str], str] = official_name,
+) -> None:
+    """Load tensors that bear the checkpoint's names, strictly; ``naming`` gives these for ours."""
     # Every non-official name is kept as it is, so that it is reported.
-    ours = {official_name(name): name for name in network.state_dict()}
+    ours = {naming(name): name for name in network.state_dict()}
     load_tensors(network, {ours.get(name, name): tensor for name, tensor in tensors.items()}, origin)
 
 

@@ -4,6 +4,8 @@
 from __future__ import annotations
 
 import io
+from collections import OrderedDict
+from contextlib import AbstractContextManager, nullcontext
 from typing import Any
 
 from hybridreg.io.faults import fault, shorten
@@ -24,10 +26,22 @@ def parse_torch(data: bytes, name: str) -> Any:
     import torch
 
     try:
-        return torch.load(io.BytesIO(data), map_location="cpu", weights_only=True)
+        with _settings():
+            return torch.load(io.BytesIO(data), map_location="cpu", weights_only=True)
     except Exception as error:  # torch raises half a dozen types for a damaged file
         problem = f"is damaged, or nothing that can be read safely ({_reason(error)})"
         raise fault(name, problem, _TRUSTED) from error
+
+
+def _settings() -> AbstractContextManager[Any]:
+    # Checkpoints of 2019 keep their options in an EasyDict, a dictionary with attributes: a plain one stands in for it.
+    # torch before 2.6 takes no stand-in and refuses such files.
+    import torch
+
+    try:
+        return torch.serialization.safe_globals([(OrderedDict, "easydict.EasyDict")])
+    except (AttributeError, TypeError, ValueError):
+        return nullcontext()
 
 
 def _reason(error: Exception) -> str:

@@ -20,8 +20,7 @@ _SAME, _ANOTHER_SCALE = 0.01, 2.0
 
 def encode(scene: Scene, stage: NetworkStage) -> Encoding:
     """The pair after the encoders of a stage's network."""
-    if stage.random_parts():
-        scene.note(f"{type(stage).__name__} ran with random weights (untrained=True)")
+    note_random(scene, stage)
     return scene.shared(("encoding", stage.network_name()), lambda: _encode(scene, stage))
 
 
@@ -53,9 +52,7 @@ def _batch(scene: Scene, stage: NetworkStage, turns: Turns) -> Batch:
     # they are; others would show it a density that it never saw, so it makes its own from the clouds.
     config = stage.network().config
     voxel = config.backbone.voxel
-    ready = all(math.isclose(s, voxel, rel_tol=_SAME) for s in (scene.source.spacing, scene.target.spacing))
-    if not ready:
-        scene.note(_mismatch(scene.spacing, voxel))
+    ready = note_grid(scene, voxel)
     source, target = (scene.source, scene.target) if ready else (scene.pair.source, scene.pair.target)
     return make_batch(
         target.points @ turns.target.T,
@@ -65,6 +62,20 @@ def _batch(scene: Scene, stage: NetworkStage, turns: Turns) -> Batch:
         subsample=not ready,
         device=stage.device,
     )
+
+
+def note_random(scene: Scene, stage: NetworkStage) -> None:
+    """Leave a note where a stage runs although its weights are random."""
+    if stage.random_parts():
+        scene.note(f"{type(stage).__name__} ran with random weights (untrained=True)")
+
+
+def note_grid(scene: Scene, voxel: float) -> bool:
+    """Have both levels the spacing that a network was trained with? Leave a note where they have not."""
+    ready = all(math.isclose(s, voxel, rel_tol=_SAME) for s in (scene.source.spacing, scene.target.spacing))
+    if not ready:
+        scene.note(_mismatch(scene.spacing, voxel))
+    return ready
 
 
 def _mismatch(spacing: float, voxel: float) -> str:

@@ -5,11 +5,12 @@ from __future__ import annotations
 
 from functools import lru_cache
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import torch
 
 from hybridreg.learned.network import RegistrationNetwork
+from hybridreg.learned.pretrained import network_class
 from hybridreg.learned.sizes import named_config
 from hybridreg.learned.untrained import untrained_parts
 from hybridreg.learned.weights import find_files, from_pretrained, load_official
@@ -27,6 +28,8 @@ class NetworkName(NamedTuple):
     size: str | None
     device: str
     image: bool  # of a network of random weights: has it OMP and VGAM?
+    network: str | None = None  # as `hybridreg.learned.pretrained` knows it; None for `RegistrationNetwork`
+    options: tuple[tuple[str, Any], ...] = ()  # what a published checkpoint cannot tell
 
 
 class Loaded(NamedTuple):
@@ -64,23 +67,40 @@ def _load(name: NetworkName, stamp: tuple[int, ...]) -> Loaded:
     return Loaded(network.to(name.device).eval().requires_grad_(False), untrained_parts(network))
 
 
-def _make(name: NetworkName) -> RegistrationNetwork:
+def _make(name: NetworkName) -> Any:
+    if name.network is not None:
+        return _make_other(name)
     if name.weights is None:
         return RegistrationNetwork(named_config(name.size or _DEFAULT_SIZE, omp=name.image, vgam=name.image))
-    if _is_checkpoint(name.weights):
+    if is_checkpoint(name.weights):
         return load_official(name.weights, name.size)
     if name.size is not None:
         raise ValueError(f"size={name.size!r}: the weights {name.weights!r} bring their own configuration")
     return from_pretrained(name.weights)
 
 
-def _is_checkpoint(weights: str) -> bool:
+def _make_other(name: NetworkName) -> Any:
+    cls = network_class(name.network or "")
+    if name.weights is None:
+        return cls(cls.named_config(name.size or _DEFAULT_SIZE))
+    if name.size is not None:
+        raise ValueError(f"size={name.size!r}: the weights {name.weights!r} tell their own configuration")
+    if is_checkpoint(name.weights):
+        return cls.load_official(name.weights, **dict(name.options))
+    told = [f"{key}={value!r}" for key, value in name.options if value is not None]
+    if told:
+        raise ValueError(f"{', '.join(told)}: the weights {name.weights!r} bring their own configuration")
+    return cls.from_pretrained(name.weights)
+
+
+def is_checkpoint(weights: str) -> bool:
+    """Is it the name of a published checkpoint, not of a folder?"""
     return weights.endswith(_CHECKPOINTS)
 
 
 def _stamp(weights: str | None) -> tuple[int, ...]:
     if weights is None:
         return ()
-    files = [Path(weights)] if _is_checkpoint(weights) else find_files(weights)
+    files = [Path(weights)] if is_checkpoint(weights) else find_files(weights)
     found = [file.stat() for file in files if file.is_file()]
     return tuple(n for stat in found for n in (stat.st_mtime_ns, stat.st_size))

@@ -1,0 +1,107 @@
+# SPDX-License-Identifier: MIT
+"""FCGF as a stage."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, ClassVar
+
+from hybridreg.learned.stages.dense_matching import DensePoints, match_dense
+from hybridreg.learned.stages.network_stage import NetworkStage
+from hybridreg.matches import Correspondences, Overlap
+from hybridreg.scene import Scene
+
+if TYPE_CHECKING:
+    from typing_extensions import Self
+
+    from hybridreg.learned.fcgf.network import FcgfNetwork
+    from hybridreg.learned.stages.networks import NetworkName
+
+
+@dataclass(frozen=True, kw_only=True)
+class Fcgf(NetworkStage):
+    """Pair each voxel of the source with the target's voxel of the nearest feature (Choy et al. 2019).
+
+    The network looks at the clouds on its own grid, anchored at each cloud's origin; the points that are matched are
+    the first of each voxel. Weights that saw no rotation in training (KITTI's published ones) match no turned clouds.
+
+    Parameters
+    ----------
+    min_overlap : float in [0, 1]
+        Points with a lower probability of overlap are left out, unless too few would remain.
+    mutual : bool
+        Keep only pairs that are each other's nearest. Published results come from all of them.
+    normalize : bool or None
+        Was a published checkpoint trained with features of length one? The file does not tell, so it must be said.
+    voxel : float or None
+        Edge (m) of the grid that a published checkpoint was trained with, see `FcgfNetwork.load_official`.
+    """
+
+    min_overlap: float = 0.5
+    mutual: bool = False
+    normalize: bool | None = None
+    voxel: float | None = None
+
+    image: ClassVar[bool] = False
+    gives: ClassVar[frozenset[str]] = frozenset({"matches"})
+    parts: ClassVar[frozenset[str]] = frozenset({"encoder", "decoder"})
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not 0.0 <= self.min_overlap <= 1.0:
+            raise ValueError(f"min_overlap={self.min_overlap} must lie in [0, 1]")
+
+    @classmethod
+    def load_official(
+        cls, path: str | os.PathLike[str], *, normalize: bool, voxel: float | None = None, **fields: Any
+    ) -> Self:
+        """Stage of a published checkpoint, read at once: arguments and errors as `FcgfNetwork.load_official`."""
+        return cls.from_pretrained(path, normalize=normalize, voxel=voxel, **fields)
+
+    def __call__(self, scene: Scene, overlap: Overlap) -> Correspondences:
+        import torch
+
+        from hybridreg.learned.fcgf.batch import make_batch
+        from hybridreg.learned.memory import require_bytes
+        from hybridreg.learned.stages.arrays import array
+        from hybridreg.learned.stages.encoding import note_grid, note_random
+
+        network = self.network()
+        voxel = network.config.voxel
+        note_random(scene, self)
+        note_grid(scene, voxel)
+        clouds = (scene.pair.target.points, scene.pair.source.points)
+        batch = make_batch(*clouds, network.config, device=self.device)
+        lengths = (len(batch.target.points), len(batch.source.points))
+        cure = f"use weights with a voxel larger than {voxel:g} m, or crop the clouds"
+        require_bytes(network.memory(batch), lengths, self.device, cure)
+        with torch.inference_mode():
+            found = network(batch)
+        source = DensePoints(points=array(batch.source.points), features=array(found.source))
+        target = DensePoints(points=array(batch.target.points), features=array(found.target))
+        return match_dense(
+            scene, overlap, source, target, min_overlap=self.min_overlap, mutual=self.mutual, spacing=voxel
+        )
+
+    def network(self) -> FcgfNetwork:  # type: ignore[override]
+        """The network in evaluation mode, read when it is first asked for.
+
+        Raises
+        ------
+        ValueError
+            As `from_pretrained`.
+        """
+        return super().network()  # type: ignore[return-value]
+
+    def network_name(self) -> NetworkName:
+        """What tells this stage's network from others."""
+        from hybridreg.learned.stages.networks import NetworkName, is_checkpoint
+
+        if self.normalize is None and self.weights is not None and is_checkpoint(self.weights):
+            raise ValueError(
+                f"Fcgf: the checkpoint {self.weights!r} does not tell whether its features were normalised in "
+                "training; say normalize=True or normalize=False (the table of FCGF's README has it)"
+            )
+        options = (("normalize", self.normalize), ("voxel", self.voxel))
+        return NetworkName(self.weights, self.size, self.device, False, "fcgf", options)

@@ -1,0 +1,99 @@
+# SPDX-License-Identifier: MIT
+"""OMNet as a stage."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import numpy as np
+
+from hybridreg import se3
+from hybridreg.learned.stages.network_stage import NetworkStage
+from hybridreg.matches import Correspondences, Pose
+from hybridreg.scene import Scene, centre
+
+if TYPE_CHECKING:
+    from typing_extensions import Self
+
+    from hybridreg.learned.omnet.network import OmnetNetwork
+    from hybridreg.learned.stages.networks import NetworkName
+
+
+@dataclass(frozen=True, kw_only=True)
+class OmNet(NetworkStage):
+    """Regress the pose from the clouds alone, four times over, on the points that overlap (Xu et al. 2021).
+
+    Looks at a random choice of the levels' points (as many of each as its configuration says), each cloud about the
+    place that it was seen from, both divided by the larger reach. Matches are not looked at. The published weights know
+    objects that are turned by less than 45 degrees about each axis.
+
+    Parameters
+    ----------
+    points : int or None
+        Points of each cloud that are looked at; None takes the configuration's. Cost is proportional to it.
+    """
+
+    points: int | None = None
+
+    image: ClassVar[bool] = False
+    parts: ClassVar[frozenset[str]] = frozenset({"encoder", "fusion", "decoder", "regression"})
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.points is not None and not self.points >= 1:
+            raise ValueError(f"points={self.points} must be at least 1")
+
+    @classmethod
+    def load_official(cls, path: str | os.PathLike[str], **fields: Any) -> Self:
+        """Stage of a published checkpoint, read at once: errors as `OmnetNetwork.load_official`."""
+        return cls.from_pretrained(path, **fields)
+
+    def __call__(self, scene: Scene, matches: Correspondences, rng: np.random.Generator) -> Pose:
+        import torch
+
+        from hybridreg.learned.memory import require_bytes
+        from hybridreg.learned.omnet.batch import make_batch
+        from hybridreg.learned.stages.arrays import array
+        from hybridreg.learned.stages.encoding import note_random
+
+        network = self.network()
+        note_random(scene, self)
+        levels = (scene.target, scene.source)
+        points = self.points or network.config.points
+        if any(len(level) > points for level in levels):
+            scene.note(
+                f"OMNet looked at {points} of {len(levels[1])} source and {len(levels[0])} target points"
+            )
+        batch, units = make_batch(
+            levels[0].points,
+            levels[1].points,
+            points,
+            rng,
+            centres=(centre(levels[0]), centre(levels[1])),
+            device=self.device,
+        )
+        require_bytes(network.memory(batch), (points, points), self.device, "look at fewer with points=...")
+        with torch.inference_mode():
+            found = array(network(batch).transform)[0]
+        if not np.isfinite(found).all():
+            scene.note("OMNet gave no finite pose")
+            return Pose.unknown(len(matches))
+        return Pose(units.metres(se3.from_rt(se3.project(found[:, :3]), found[:, 3])))
+
+    def network(self) -> OmnetNetwork:  # type: ignore[override]
+        """The network in evaluation mode, read when it is first asked for.
+
+        Raises
+        ------
+        ValueError
+            As `from_pretrained`.
+        """
+        return super().network()  # type: ignore[return-value]
+
+    def network_name(self) -> NetworkName:
+        """What tells this stage's network from others."""
+        from hybridreg.learned.stages.networks import NetworkName
+
+        return NetworkName(self.weights, self.size, self.device, False, "omnet")

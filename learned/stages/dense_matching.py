@@ -1,0 +1,78 @@
+# SPDX-License-Identifier: MIT
+"""Points of two clouds paired by the nearest of their features: what the dense matchers have in common."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hybridreg.classical.nearest import nearest
+from hybridreg.learned.stages.spreading import gather
+from hybridreg.matches import Correspondences, Overlap
+from hybridreg.scene import Scene
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
+# An overlap that leaves fewer points than this is taken to be wrong, and ignored.
+_FEWEST = 100
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class DensePoints:
+    """Points (n, 3) of a cloud in metres, and their features (n, d) as they are compared."""
+
+    points: Array
+    features: Array
+
+
+def match_dense(
+    scene: Scene,
+    overlap: Overlap,
+    source: DensePoints,
+    target: DensePoints,
+    *,
+    min_overlap: float,
+    mutual: bool,
+    spacing: float,
+) -> Correspondences:
+    """Each source point with the target point of the nearest feature; the weight is their cosine, at least 0.
+
+    Parameters
+    ----------
+    min_overlap
+        Points with a lower probability of overlap are left out, unless too few would remain.
+    mutual
+        Keep only pairs that are each other's nearest.
+    spacing
+        Of the points, metres.
+    """
+    levels = ((source, scene.source.points, overlap.source), (target, scene.target.points, overlap.target))
+    rows = [_rows(cloud, level, probability, min_overlap) for cloud, level, probability in levels]
+    if not (len(rows[0]) and len(rows[1])):
+        return Correspondences.none()
+    found = nearest(source.features[rows[0]], target.features[rows[1]])
+    kept = found.mutual if mutual else np.ones(len(rows[0]), dtype=bool)
+    first, second = rows[0][kept], rows[1][found.row[kept]]
+    cosine = np.sum(unit(source.features[first]) * unit(target.features[second]), axis=1)
+    return Correspondences(
+        source=source.points[first],
+        target=target.points[second],
+        weight=np.maximum(cosine, 0.0),
+        spacing=spacing,
+    )
+
+
+def _rows(cloud: DensePoints, level: Array, probability: Array, min_overlap: float) -> Indices:
+    # A feature that is not finite (of length zero, normalised as published) is nearest to nothing.
+    usable = np.isfinite(cloud.features).all(axis=1)
+    rows = np.flatnonzero(usable & (gather(probability, level, cloud.points) > min_overlap))
+    enough = len(rows) >= min(_FEWEST, len(cloud.points))
+    return rows if enough else np.flatnonzero(usable)
+
+
+def unit(features: Array) -> Array:
+    """Features (n, d) of length one."""
+    return features / np.maximum(np.linalg.norm(features, axis=1, keepdims=True), 1e-12)
