@@ -35,8 +35,8 @@ _YAW_STEP_DEG, _SHARE = 4.0, 0.5
 _LEVELLED, _WHITEN = (0.5, 0.0), (0.0, 0.75)
 # Peaks looked at first; the others are not where one of these is beyond doubt.
 _FIRST = 10
-# Log-odds of the best pose of the run below which no other look finds the right one: of 30 pairs (`sim:val`,
-# `sim:train`) of which the right pose came later than the first ten, the best one before had -3.3 at least.
+# Log-odds of the best pose of the run below which no other spectrum finds the right one: of the pairs of `sim:val` and
+# `sim:train` that another spectrum solved, the best pose before had -3.3 at least.
 _LOST = -5.0
 # Degrees: a sensor whose ground leans so much hangs on its head.
 _UPTURNED_DEG = 140.0
@@ -116,8 +116,10 @@ class BirdsEye(Stage):
             for some, plain in ((poses[:_FIRST], BEYOND_DOUBT), (poses[_FIRST:], NEARLY)):
                 found += best_first(scene, some)
                 found.sort(key=lambda rival: -rival.support)
-                if found and (found[0].support >= plain or highest(scene) < _LOST):
+                if found and found[0].support >= plain:
                     return found
+            if highest(scene) < _LOST:
+                return found
         if not found or not self.again:
             return found
         # Levelled by the best pose, both clouds lie truer than by their grounds.

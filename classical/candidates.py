@@ -31,9 +31,9 @@ _SLOTS = ("overlap", "match", "estimate")
 _SURE = 0.99
 # Poses looked at of each entry: its own and the best of its rivals; how many of these are refined at most.
 _LOOKED_AT, _REFINED = 8, 2
-# The best poses of all, which are looked around when no entry brought certainty, unless their log-odds lie below this:
-# half a metre beside the right pose they may well be there.
-_LOOKED_AROUND, _LOST = 4, -7.0
+# The best poses of all, which are looked around when no entry brought certainty, unless their log-odds lie below this
+# (half a metre beside the right pose they may well be there) or so much below those of the best.
+_LOOKED_AROUND, _LOST, _BEHIND = 4, -7.0, 6.0
 # Log-odds below which a settled pose is not refined, and by which its support may fall when it is refined.
 _HOPELESS, _NOISE = -3.0, 1.0
 # Log-odds above which a pose is weighed, and moved to where more speaks for it, unless surfaces hold it by themselves:
@@ -121,7 +121,8 @@ class Candidates(Stage):
         if not found or found[0].support < rivals.HOPELESS:
             return
         found = rivals.counted(scene, rivals.distinct(scene, [*found, *rivals.second_look(scene)]), answers)
-        hopeful = [one for one in found[:_LOOKED_AROUND] if one.support > _LOST]
+        least = max(_LOST, found[0].support - _BEHIND)
+        hopeful = [one for one in found[:_LOOKED_AROUND] if one.support > least]
         if hopeful:
             near = rivals.distinct(scene, hop(scene, np.array([one.T for one in hopeful]), last))
             yield _polished(scene, rivals.counted(scene, self._joined(scene, found, near), answers))
