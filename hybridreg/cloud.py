@@ -63,8 +63,10 @@ class PointCloud:
 
         Parameters
         ----------
-        x : path, (N, 3+) array or nested list, torch tensor, Open3D cloud (legacy or tensor), PointCloud
-            Coordinates in metres in the first three columns.
+        x : path, array, table or object that holds points
+            Arrays and tensors (N, 3+), (3 to 6, N) or (H, W, 3+); records, tables and dictionaries with x, y and z by
+            name; ROS' PointCloud2, laspy's and Open3D's clouds, and whatever else keeps `points` (`hybridreg.held`).
+            Metres, unless a name tells another unit, as `X (mm)`. What is masked or missing is not finite.
         name : str
             What error messages call the cloud.
         nonfinite : "raise" or "drop"

@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from hybridreg.held import points_of
+
 Array = NDArray[np.float64]
 
 MIN_POINTS = 20
@@ -24,43 +26,21 @@ def coordinates(x: Any, name: str) -> Array:
         from hybridreg.io import read_points
 
         return read_points(x)
-    array = _as_array(x, name)
-    if array.dtype.kind not in "fiu":
-        raise ValueError(
-            f"{name}: coordinates must be numbers, got dtype {array.dtype}; convert with astype(float)"
-        )
-    if array.size == 0:
-        raise ValueError(
-            f"{name}: the cloud is empty (shape {array.shape}); it needs at least {MIN_POINTS} points"
-        )
-    upright = array.ndim == 2 and array.shape[1] >= 3
-    lying = array.ndim == 2 and array.shape[0] == 3 and array.shape[1] >= MIN_POINTS
-    if lying or not upright:
-        hint = "; transpose it" if lying else ""
-        raise ValueError(f"{name}: expected an array of shape (N, 3), got {array.shape}{hint}")
-    with np.errstate(over="ignore"):  # a long double beyond float64 becomes infinite, and is refused as such
-        return np.array(array[:, :3], dtype=np.float64)
-
-
-def _as_array(x: Any, name: str) -> NDArray[Any]:
     try:
-        array = np.asarray(_held_by(x))
+        return points_of(x, name)
+    except (ValueError, MemoryError) as error:
+        if str(error).startswith(f"{name}: "):
+            raise
+        raise _unreadable(x, name, error) from error
     except Exception as error:  # the object is somebody else's, and may raise whatever it likes
-        raise ValueError(
-            f"{name}: cannot read an array of shape (N, 3) from {type(x).__name__}: {error}"
-        ) from error
-    return array
+        raise _unreadable(x, name, error) from error
 
 
-def _held_by(x: Any) -> Any:
-    if hasattr(x, "detach"):  # torch tensor, on any device
-        x = x.detach().cpu()
-        # numpy has no bfloat16, and float64 holds every other float exactly.
-        return (x.double() if x.is_floating_point() else x).numpy()
-    if hasattr(x, "point") and hasattr(x, "to_legacy"):  # Open3D tensor cloud
-        # One without points has no positions either.
-        return x.point["positions"].cpu().numpy() if "positions" in x.point else np.empty((0, 3))
-    return x.points if hasattr(x, "points") else x  # Open3D legacy cloud, or anything shaped like one
+def _unreadable(x: Any, name: str, error: Exception) -> ValueError:
+    return ValueError(
+        f"{name}: cannot read points from {type(x).__name__}: {error}; pass an array of shape (N, 3), such as "
+        "numpy.column_stack([x, y, z])"
+    )
 
 
 def finite(points: Array, name: str, *, drop: bool) -> tuple[Array, NDArray[np.bool_] | None]:
