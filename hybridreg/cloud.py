@@ -91,7 +91,7 @@ class PointCloud:
         kept, rows = gate.finite(raw, name, drop=nonfinite == "drop")
         said = given(viewpoint, len(raw), name)
         offset = _whole_kilometres(kept)
-        points = kept - offset
+        points = kept - offset if offset.any() else kept  # a copy of the caller's already
         gate.check(points, name)
         points.setflags(write=False)
         return cls(
@@ -113,7 +113,7 @@ class PointCloud:
 
     @cached_property
     def radii(self) -> Array:
-        """Distances (N,) from the cloud's middle, the shortest first, metres."""
+        """Distances from the cloud's middle, the shortest first, metres: (N,), at most a million."""
         return extent.radii(self.points)
 
     @cached_property
@@ -143,5 +143,5 @@ def _whole_kilometres(points: Array) -> Array:
     # it had, its sensor at the origin again. The median, because a stray return may lie anywhere.
     if len(points) == 0:
         return np.zeros(3)
-    middle = np.median(points, axis=0)
+    middle = np.median(extent.some(points), axis=0)
     return np.where(np.abs(middle) > _MAP_GRID, np.round(middle, -3), 0.0)

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -44,6 +44,10 @@ class Pair:
     id: str = "pair"
     meta: Mapping[str, Any] = field(default_factory=dict)
     gravity: Gravity = "known"
+
+    def with_clouds(self, source: PointCloud, target: PointCloud) -> Pair:
+        """The same pair of other clouds."""
+        return replace(self, source=source, target=target)
 
     @classmethod
     def of(

@@ -169,7 +169,7 @@ class Pipeline(Stage):
         with stopwatch(seconds, "downsample"):
             scene = self.downsample(pair)
         fitting.check_scene(scene)
-        for name, cloud in (("source", pair.source), ("target", pair.target)):
+        for name, cloud in (("source", scene.pair.source), ("target", scene.pair.target)):
             if len(cloud.seen.places) != 1:
                 scene.note(f"the {name} was seen from {_places(cloud)}")
             if cloud.dropped:
