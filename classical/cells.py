@@ -73,7 +73,7 @@ def voxel_cells(points: Array, voxel: float) -> Cells:
         x, y, z = ((columns - origin[:, None]) / voxel).astype(np.int64)
         lots.append(_lot(columns, x + nx * (y + ny * z), nx * ny * nz, start))
     whole = lots[0] if len(lots) == 1 else _merged(lots)
-    return Cells(whole.sums.T / whole.count[:, None], whole.first)
+    return Cells(np.ascontiguousarray(whole.sums.T) / whole.count[:, None], whole.first)
 
 
 def _corners(points: Array) -> tuple[Array, Array]:
