@@ -86,7 +86,7 @@ def check_image(pipeline: Pipeline, pair: Pair) -> None:
 
 def check_stage_image(stage: Any, pair: Pair) -> None:
     """Refuse a pair without an image where this stage cannot do without."""
-    if pair.image is None and "image" in _words(stage, "needs"):
+    if not pair.has_image and "image" in _words(stage, "needs"):
         raise ValueError(f"pair {pair.id}: {_label(stage)} needs an image; pass image=...")
 
 
