@@ -35,7 +35,7 @@ class PointCloud:
     offset : (3,) float64
         Whole kilometres taken off the coordinates that the user gave; zero for a cloud in its sensor's frame.
     dropped : int
-        Non-finite points left out on request.
+        Points left out on request: not finite, or no returns.
     said : Seen or None
         Where it was seen from, as a caller or a data set says; None puts a place to the test.
     guess : (3,) float64 or None
@@ -70,7 +70,8 @@ class PointCloud:
         name : str
             What error messages call the cloud.
         nonfinite : "raise" or "drop"
-            What to do with points that are not finite.
+            What to do with points that are not finite. "drop" also leaves out what drivers write where nothing came
+            back, the very origin, where that is 1 % of the points or more; "raise" warns of it.
         viewpoint : "auto", "none", (3,), (N, 3), or ((k, 3), (N,))
             Where the sensor stood, in the coordinates of the points: one place, one for each point, or places and the
             row of each point's. "none" is honest for a map, a CAD model or a merged cloud whose sensors are not known:
@@ -89,6 +90,7 @@ class PointCloud:
         raw = gate.coordinates(x, name)
         place = read_viewpoint(x) if isinstance(x, (str, os.PathLike)) else None
         kept, rows = gate.finite(raw, name, drop=nonfinite == "drop")
+        kept, rows = gate.returned(kept, rows, name, drop=nonfinite == "drop")
         said = given(viewpoint, len(raw), name)
         offset = _whole_kilometres(kept)
         points = kept - offset if offset.any() else kept  # a copy of the caller's already

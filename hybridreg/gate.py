@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import os
+import warnings
 from collections.abc import Iterator
 from typing import Any
 
@@ -20,6 +21,7 @@ _LARGEST = 1.5e11
 # A cloud thinner than a millionth of its length in two directions fixes no rotation about that length.
 _THINNEST = 1e-6
 _LOT = 2**18  # points
+_FILLED = 0.01  # share of points in the very origin from which they are no returns
 
 
 def coordinates(x: Any, name: str) -> Array:
@@ -59,6 +61,31 @@ def finite(points: Array, name: str, *, drop: bool) -> tuple[Array, NDArray[np.b
             'remove them or pass nonfinite="drop"'
         )
     return points[good], good
+
+
+def returned(
+    points: Array, rows: NDArray[np.bool_] | None, name: str, *, drop: bool
+) -> tuple[Array, NDArray[np.bool_] | None]:
+    """Warn of many points exactly at (0, 0, 0), which drivers write where nothing came back; or leave them out where
+    that was asked for. `rows` (N,) are those that `finite` left, and what is returned is as it returns."""
+    fewest = max(MIN_POINTS, _FILLED * len(points))
+    if np.count_nonzero(points[:, 0] == 0.0) < fewest:
+        return points, rows
+    good = points.any(axis=1)
+    n_bad = len(points) - int(good.sum())
+    if n_bad < fewest or n_bad == len(points):
+        return points, rows
+    if not drop:
+        warnings.warn(
+            f"{name}: {n_bad} of {len(points)} points lie exactly at (0, 0, 0), which drivers write where nothing came "
+            'back; remove them or pass nonfinite="drop"',
+            UserWarning,
+            stacklevel=4,
+        )
+        return points, rows
+    kept = np.ones(len(points), dtype=bool) if rows is None else rows.copy()
+    kept[kept] = good
+    return points[good], kept
 
 
 def check(points: Array, name: str) -> None:

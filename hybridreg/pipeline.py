@@ -173,7 +173,9 @@ class Pipeline(Stage):
             if len(cloud.seen.places) != 1:
                 scene.note(f"the {name} was seen from {_places(cloud)}")
             if cloud.dropped:
-                scene.note(f"{cloud.dropped} points of the {name} were not finite and were dropped")
+                scene.note(
+                    f"{cloud.dropped} points of the {name} were missing (not finite, or at 0, 0, 0) and were dropped"
+                )
         with stopwatch(seconds, "overlap"):
             overlap = self.overlap(scene)
         with stopwatch(seconds, "match"):
