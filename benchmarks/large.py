@@ -59,7 +59,6 @@ def measure(data: str, name: str, n: int) -> dict[str, Any]:
     pair, gate, gate_wall = timed(lambda: Pair.of(*clouds, id=name))
     scene, grid, grid_wall = timed(lambda: VoxelGrid()(pair))
     _, after, _ = timed(lambda: Pipeline.preset("default").run(scene.pair))
-    del scene
     reset_peak_memory()
     before = peak_memory_mb() or np.nan
     result, total, wall = timed(lambda: Pipeline.preset("default").run(pair))
@@ -101,7 +100,7 @@ def main() -> None:
         return
     print("processor seconds, both clouds together; MB of the whole process")
     print(
-        "after: of `default` on what the grid made of the clouds; entry: wall seconds of gate and grid; wall: of `default` after the gate"
+        "after: of `default` on what the grid left; entry: wall seconds of gate and grid; wall: of `default`"
     )
     print(
         f"{'points a cloud':>14s} {'after grid':>10s} {'gate':>7s} {'grid':>7s} {'verdict':>8s} {'default':>8s} "
