@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from hybridreg import columns, messages
 from hybridreg.io.arrays import TOGETHER, array_points
+from hybridreg.io.las_units import in_metres
 
 Array = NDArray[np.float64]
 
@@ -44,6 +45,8 @@ def points_of(x: Any, name: str, depth: int = 0) -> Array:
     if names is not None:
         return _from_table(x, names, name, depth)
     _refuse_mesh(x, name)
+    if hasattr(getattr(x, "header", None), "vlrs") and hasattr(x, "xyz"):  # laspy
+        return in_metres(_from_array(np.asarray(x.xyz), name), x.header.vlrs, name)
     held = _held(x)
     if held is not None and depth < _DEEPEST:
         return points_of(held, name, depth + 1)
