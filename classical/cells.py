@@ -15,6 +15,8 @@ Integers = NDArray[np.int64]
 _MOST_CELLS = 2**62
 # Points that are sorted at once: more would not be faster, and take seven times their own memory.
 _LOT = 2**20
+# Cells of several lots from which they are put together before more are made.
+_KEPT = 4 * _LOT
 
 
 class Cells(NamedTuple):
@@ -65,13 +67,17 @@ def voxel_cells(points: Array, voxel: float) -> Cells:
             "choose a larger voxel or check the unit"
         )
     nx, ny, nz = (int(s) for s in shape)
-    lots = []
+    lots: list[_Lot] = []
+    most = _KEPT
     for start in range(0, len(points), _LOT):
         columns = np.ascontiguousarray(
             points[start : start + _LOT].T
         )  # (3, m): numpy reduces along rows faster
         x, y, z = ((columns - origin[:, None]) / voxel).astype(np.int64)
         lots.append(_lot(columns, x + nx * (y + ny * z), nx * ny * nz, start))
+        if sum(len(lot.key) for lot in lots) > most:
+            lots = [_merged(lots)]
+            most = max(_KEPT, 2 * len(lots[0].key))
     whole = lots[0] if len(lots) == 1 else _merged(lots)
     return Cells(np.ascontiguousarray(whole.sums.T) / whole.count[:, None], whole.first)
 

@@ -67,6 +67,7 @@ def test_lots_give_the_same_cells(points: np.ndarray, voxel: float) -> None:
     whole = cells_of.voxel_cells(points, voxel)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(cells_of, "_LOT", 7)
+        patch.setattr(cells_of, "_KEPT", 20)
         lots = cells_of.voxel_cells(points, voxel)
     np.testing.assert_allclose(lots.centroids, whole.centroids, rtol=1e-12, atol=1e-9)
     assert np.array_equal(lots.first, whole.first)
