@@ -32,7 +32,7 @@ class Cells(NamedTuple):
 
 class _Lot(NamedTuple):
     key: Integers  # (n,) of the occupied cells, rising
-    count: Integers  # (n,) points in each
+    counts: Integers  # (n,) points in each
     sums: Array  # (3, n) of their coordinates
     first: Integers  # (n,) row of the first of them
 
@@ -79,7 +79,7 @@ def voxel_cells(points: Array, voxel: float) -> Cells:
             lots = [_merged(lots)]
             most = max(_KEPT, 2 * len(lots[0].key))
     whole = lots[0] if len(lots) == 1 else _merged(lots)
-    return Cells(np.ascontiguousarray(whole.sums.T) / whole.count[:, None], whole.first)
+    return Cells(np.ascontiguousarray(whole.sums.T) / whole.counts[:, None], whole.first)
 
 
 def _corners(points: Array) -> tuple[Array, Array]:
@@ -115,6 +115,6 @@ def _merged(lots: list[_Lot]) -> _Lot:
     order = np.argsort(key, kind="stable")
     key = key[order]
     begins = np.flatnonzero(np.concatenate([[True], key[1:] != key[:-1]]))
-    count = np.add.reduceat(np.concatenate([lot.count for lot in lots])[order], begins)
+    counts = np.add.reduceat(np.concatenate([lot.counts for lot in lots])[order], begins)
     sums = np.add.reduceat(np.concatenate([lot.sums for lot in lots], axis=1)[:, order], begins, axis=1)
-    return _Lot(key[begins], count, sums, np.concatenate([lot.first for lot in lots])[order][begins])
+    return _Lot(key[begins], counts, sums, np.concatenate([lot.first for lot in lots])[order][begins])
