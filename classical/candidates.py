@@ -16,6 +16,7 @@ from hybridreg.classical.nothing import NoOverlap
 from hybridreg.matches import Correspondences, Pose
 from hybridreg.resolution import comparable, size_ratio
 from hybridreg.scene import Scene
+from hybridreg.shipped_weights import MissingWeights
 from hybridreg.stage import Stage
 from hybridreg.verdict import matched, rivals, support, weigh
 from hybridreg.verdict.climb import climb
@@ -57,7 +58,8 @@ class Candidates(Stage):
     of : tuple of mappings
         Recipes: each holds an estimate stage, perhaps a match stage, and perhaps an overlap stage for that. An entry
         without `match` gets the matches that this stage was given. One that raises ValueError, ImportError or OSError,
-        or lacks its image, is left out with a note.
+        or lacks its image, is left out with a note; where every one lacks a package or its weights, that is an
+        ImportError.
     refine : stage of the refine slot
         For the best poses of an entry. The pose returned needs no other refinement, unless nothing speaks for it: no
         refinement is tried then, as nothing would let it rest.
@@ -109,14 +111,21 @@ class Candidates(Stage):
         """What is found after each entry, and after a second look at the end, the best supported first."""
         found: list[Rival] = []
         answers: list[list[Rival]] = []
+        missing: list[str] = []
         # A generator each, so that an entry's answer does not hang on those before it.
         *generators, last = rng.spawn(len(self.of) + 1)
         for entry, own in zip(self.of, generators, strict=True):
-            pose = _pose(entry, scene, matches, own)
+            try:
+                pose = _pose(entry, scene, matches, own)
+            except (ImportError, MissingWeights) as error:
+                missing.append(_left_out(entry, scene, error))
+                pose = Pose.unknown()
             if pose.found and np.isfinite(pose.T).all():
                 offered = rivals.best_first(scene, [pose.T, *pose.rivals[: _LOOKED_AT - 1]])
                 answers.append(offered)
                 found = _polished(scene, rivals.counted(scene, self._joined(scene, found, offered), answers))
+            if len(missing) == len(self.of):
+                raise ImportError(f"none of its {len(missing)} recipes can be run here: {missing[0]}")
             yield found
         if not found or found[0].support < rivals.HOPELESS:
             return
@@ -179,8 +188,13 @@ def _pose(entry: Entry, scene: Scene, matches: Correspondences, rng: np.random.G
         if "match" in entry:
             matches = scene.matched(entry["match"](scene, entry.get("overlap", NoOverlap())(scene)))
         return entry["estimate"](scene, matches, rng)
-    except (ValueError, ImportError, OSError) as error:
-        scene.note(
-            f"a candidate ({' + '.join(type(s).__name__ for s in entry.values())}) was left out: {error}"
-        )
+    except MissingWeights:
+        raise
+    except (ValueError, OSError) as error:
+        _left_out(entry, scene, error)
         return Pose.unknown()
+
+
+def _left_out(entry: Entry, scene: Scene, error: Exception) -> str:
+    scene.note(f"a candidate ({' + '.join(type(s).__name__ for s in entry.values())}) was left out: {error}")
+    return str(error)

@@ -17,6 +17,7 @@ from hybridreg.normals import tree
 from hybridreg.resources import n_threads, n_workers
 from hybridreg.scene import Scene
 from hybridreg.stage import Stage
+from hybridreg.wheels import load
 
 Array = NDArray[np.float64]
 
@@ -59,8 +60,7 @@ class Gicp(Stage):
         limits.at_least(self, 1, "iterations")
 
     def __call__(self, scene: Scene, pose: Pose) -> Pose:
-        import small_gicp
-
+        small_gicp = load("small_gicp", 'refine="gicp"')
         voxel = self.voxel or self.fineness * scene.spacing
         distances = self.max_distances or (5 * scene.spacing, 2.5 * scene.spacing, 1.25 * scene.spacing)
         T = pose.T
@@ -124,8 +124,7 @@ def _within(scene: Scene, T: Array, voxel: float, reach: float) -> Array:
 
 
 def _surfaces(points: Array, neighbours: int) -> tuple[Any, Any]:
-    import small_gicp
-
+    small_gicp = load("small_gicp", 'refine="gicp"')
     cloud = small_gicp.PointCloud(points)
     kd_tree = small_gicp.KdTree(cloud, num_threads=n_workers())
     # Each point's covariance is its own sum, so here the number of threads changes nothing.

@@ -5,13 +5,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from hybridreg import limits
+from hybridreg import limits, wheels
 from hybridreg.classical.voxel import voxel_centroids
 from hybridreg.matches import Correspondences, Pose
 from hybridreg.resources import n_threads, on_one_core
@@ -44,6 +44,8 @@ class KissMatcher(Stage):
     max_matches : int
         KISS-Matcher keeps at most so many initial matches.
     """
+
+    wheels: ClassVar[tuple[str, ...]] = ("kiss_matcher",)
 
     voxel: float | None = None
     scale: float = 1.25
@@ -96,10 +98,7 @@ class KissMatcher(Stage):
 
 @lru_cache(maxsize=1)
 def _wheel() -> Any:
-    try:
-        import kiss_matcher
-    except ImportError as error:
-        raise ImportError(f'estimate="kiss" needs `pip install kiss-matcher` ({error})') from error
+    kiss_matcher = wheels.load("kiss_matcher", 'estimate="kiss"')
     # Its threads race, so that 1 match in 30 differed from the others. It counts the cores once in a process, at the
     # first match; where that match sees one core, all of 600 later ones were the same (1.0.2, Linux).
     points = np.random.default_rng(0).uniform(size=(3, 300))

@@ -13,6 +13,7 @@ from hybridreg.classical.voxel import voxel_centroids
 from hybridreg.matches import Pose
 from hybridreg.scene import Scene
 from hybridreg.stage import Stage
+from hybridreg.wheels import load
 
 # The map drops points beyond this range; the target is one scan, nothing of it is to be dropped.
 _EVERYTHING = 1e6
@@ -43,8 +44,8 @@ class KissIcp(Stage):
         limits.at_least(self, 1, "iterations")
 
     def __call__(self, scene: Scene, pose: Pose) -> Pose:
-        from kiss_icp.mapping import VoxelHashMap
-        from kiss_icp.registration import Registration
+        VoxelHashMap = load("kiss_icp.mapping", 'refine="kiss-icp"').VoxelHashMap
+        Registration = load("kiss_icp.registration", 'refine="kiss-icp"').Registration
 
         sigma = self.sigma or 2.5 * scene.spacing
         voxel = self.voxel or 1.25 * scene.spacing

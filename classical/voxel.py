@@ -10,6 +10,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from hybridreg.classical.cells import voxel_centroids
+from hybridreg.classical.thinning import thinned
 from hybridreg.pair import Pair
 from hybridreg.resolution import comparable, default_voxel
 from hybridreg.scene import Level, Scene
@@ -17,7 +19,6 @@ from hybridreg.stage import Stage
 
 Array = NDArray[np.float64]
 
-_MOST_CELLS = 2**62
 # Where the shorter of two reaches gives so small a voxel that the other cloud keeps more points, no method gains by
 # them, and all take longer.
 _MOST_POINTS = 30_000
@@ -32,7 +33,8 @@ class VoxelGrid(Stage):
     voxel : float or None
         Edge of a cell, metres. None derives one length for both clouds from how far they reach
         (`hybridreg.resolution.default_voxel`), a longer one where a cloud would keep more than 30,000 points of its
-        own otherwise, and notes it in the result.
+        own otherwise, and notes it in the result. A cloud of more than a million and a half points is first thinned to
+        cells of a quarter of that (`hybridreg.classical.thinning`).
     density : "keep" or "match"
         "match" gives each cloud the voxel at which both have about as many points per occupied volume; for a
         sparse sensor against a dense one.
@@ -48,6 +50,17 @@ class VoxelGrid(Stage):
             raise ValueError(f"density={self.density!r} must be 'keep' or 'match'")
 
     def __call__(self, pair: Pair) -> Scene:
+        given, pair = pair, thinned(pair, self.voxel)
+        scene = self._scene(pair)
+        for name, cloud, all_of_it in (
+            ("source", pair.source, given.source),
+            ("target", pair.target, given.target),
+        ):
+            if len(cloud) < len(all_of_it):
+                scene.note(f"the {name}'s {len(all_of_it)} points were first thinned to {len(cloud)}")
+        return scene
+
+    def _scene(self, pair: Pair) -> Scene:
         clouds = (pair.source, pair.target)
         if self.voxel is None and not comparable(*clouds):
             return _each_by_itself(pair)
@@ -99,59 +112,6 @@ def _each_by_itself(pair: Pair) -> Scene:
 def _two_digits_up(length: float) -> float:
     unit = 10.0 ** (math.floor(math.log10(length)) - 1)
     return float(f"{math.ceil(length / unit) * unit:.2g}")
-
-
-def voxel_centroids(points: Array, voxel: float) -> Array:
-    """Centroids (n, 3) of the occupied cells of a grid, ordered by cell.
-
-    Parameters
-    ----------
-    points : (N, 3)
-    voxel : float
-        Edge of a cell, metres.
-
-    Raises
-    ------
-    ValueError
-        If the grid has more cells than an index can tell apart.
-    """
-    columns = np.ascontiguousarray(points.T)  # (3, N): numpy reduces along rows ten times faster
-    key, n_cells = _cell_of(columns, voxel)
-    member, n = _members(key, n_cells)
-    count = np.bincount(member, minlength=n)
-    sums = [np.bincount(member, weights=column, minlength=n) for column in columns]
-    return np.column_stack(sums) / count[:, None]
-
-
-def _cell_of(columns: Array, voxel: float) -> tuple[NDArray[np.int64], int]:
-    # The origin lies a hair below the smallest coordinate: data rounded to millimetres would otherwise sit on
-    # cell borders, where the last digit of a float decides.
-    origin = columns.min(axis=1) - 1e-5 * voxel
-    shape = np.floor((columns.max(axis=1) - origin) / voxel) + 1.0
-    if math.prod(shape.tolist()) > _MOST_CELLS:
-        raise ValueError(
-            f"a voxel of {voxel:.3g} m cuts the cloud into {' x '.join(f'{s:.3g}' for s in shape)} cells; "
-            "choose a larger voxel or check the unit"
-        )
-    x, y, z = ((columns - origin[:, None]) / voxel).astype(np.int64)
-    nx, ny, nz = (int(s) for s in shape)
-    return x + nx * (y + ny * z), nx * ny * nz
-
-
-def _members(key: NDArray[np.int64], n_cells: int) -> tuple[NDArray[np.int64], int]:
-    # Rank of each point's cell among the occupied ones, and their number.
-    bits = len(key).bit_length()
-    if n_cells >= 2 ** (63 - bits):
-        cells, member = np.unique(key, return_inverse=True)
-        return member, len(cells)
-    # Cell and row in one number, because numpy sorts numbers several times faster than it finds their order.
-    both = np.sort((key << bits) | np.arange(len(key)))
-    cell = both >> bits
-    first = np.concatenate([[True], cell[1:] != cell[:-1]])
-    rank = np.cumsum(first) - 1
-    member = np.empty(len(key), dtype=np.int64)
-    member[both & ((1 << bits) - 1)] = rank
-    return member, int(rank[-1]) + 1
 
 
 def _thin(points: Array, voxel: float, n_wanted: int) -> tuple[Array, float]:

@@ -45,11 +45,19 @@ class Attempt:
 
 
 def attempt(method: Method, pair: Pair, seed: int) -> Attempt:
-    """Run a method; whatever it raises becomes `error`, in one line."""
+    """Run a method; whatever it raises becomes `error`, in one line.
+
+    Raises
+    ------
+    ImportError
+        A package that the method needs is not here: it was not run.
+    """
     reset_peak_memory()
     start = time.perf_counter()
     try:
         tried = _traced(method, pair, seed) if isinstance(method, Traceable) else _called(method, pair, seed)
+    except ImportError:  # what was never run has not failed
+        raise
     except Exception as error:  # a failing pair is a failed row, never an abort
         seconds = {"total": time.perf_counter() - start}
         return Attempt(T=None, seconds=seconds, peak_memory_mb=peak_memory_mb(), error=one_line(error))

@@ -14,6 +14,7 @@ from hybridreg.eval.controls import MARK
 from hybridreg.eval.protocols import Protocol
 from hybridreg.eval.scoring import scene_of
 from hybridreg.eval.table import Table
+from hybridreg.io.cells import cell
 
 _LATEX = {"\\": r"\textbackslash{}", "°": r"$^\circ$", "–": "--"} | {c: f"\\{c}" for c in "&%$#_{}"}
 _LATEX |= {
@@ -36,7 +37,7 @@ def markdown(table: Table, protocols: Sequence[Protocol]) -> str:
         parts.extend(f"### {title}\n\n{markdown_table(lines)}" for title, lines in named if lines)
     if table.paper is not None:
         parts.append(f"## {table.paper.heading()}\n\n{markdown_table(table.paper.cells())}")
-    parts.extend(f"Not run: {name}. {problem}" for name, problem in table.problems.items())
+    parts.extend(table.remarks())
     return "\n\n".join([*parts, fine_print(table)]) + "\n"
 
 
@@ -91,6 +92,7 @@ def latex(table: Table, protocols: Sequence[Protocol]) -> str:
     parts = [_latex_table(table.caption(each), tables(table, each)["Results"]) for each in protocols]
     if table.paper is not None:
         parts.append(_latex_table(table.paper.heading(), table.paper.cells()))
+    parts.extend(f"\\noindent {_escape(remark)}\n" for remark in table.remarks())
     return "\n".join(parts)
 
 
@@ -122,9 +124,10 @@ def table_csv(table: Table, protocols: Sequence[Protocol]) -> str:
                 | {f"recall at {key}": value for key, value in at.items()}
                 | {f"seconds {stage}": value for stage, value in seconds.items()}
             )
+    lines.extend({"method": name, "data": table.data, "not run": why} for name, why in table.problems.items())
     text = io.StringIO()
     head = list(dict.fromkeys(key for line in lines for key in line))
-    writer = csv.DictWriter(text, head, restval="", lineterminator="\n")
-    writer.writeheader()
-    writer.writerows(lines)
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow([cell(key) for key in head])
+    writer.writerows([cell(line.get(key, "")) for key in head] for line in lines)
     return text.getvalue()

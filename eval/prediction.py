@@ -56,6 +56,8 @@ def predict(
     ------
     ValueError
         The file was made by another configuration or version; or two pairs share an id.
+    ImportError
+        A package that the method or the data need is not here; what was never run is no failed row.
     """
     ids = ids_of(pairs)
     config = {
@@ -100,6 +102,8 @@ def predict_pair(
     with one_thread():
         try:
             labelled = pairs[index]
+        except ImportError:  # of a reader: no fault of the pair
+            raise
         except Exception as error:
             return Row(index=index, id=name, error=one_line(error))
         told, pair = method.told(labelled) if isinstance(method, Control) else (method, labelled.pair)

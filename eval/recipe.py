@@ -159,7 +159,7 @@ def _rows(base: Changes, rows: Sequence[Changes]) -> Iterator[Line]:
         name, merged = own or title_of(changed), changes.merge(base, changed)
         try:
             method = _build(merged)
-        except MissingWeights as error:
+        except (MissingWeights, ImportError) as error:
             yield Line(name=name, method=None, problem=str(error))
         else:
             oracle = isinstance(method, Control) and method.oracle
@@ -178,7 +178,7 @@ def _grid(base: Changes, sweep: Changes) -> Iterator[Line]:
             changed = changes.merge(changed, {slot: {field: value} if field else value})
         try:
             yield Line(name=title_of(changed), method=_build(changes.merge(base, changed)))
-        except (ValueError, MissingWeights) as error:
+        except (ValueError, MissingWeights, ImportError) as error:
             yield Line(name=title_of(changed), method=None, problem=str(error))
 
 

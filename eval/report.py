@@ -67,7 +67,7 @@ def html(table: Table, protocols: Sequence[Protocol], pairs: Sequence[LabelledPa
     body.append(page.heading("Settings"))
     for entry in table.methods:
         body += [page.heading(entry.name, 3), page.code(entry.config)]
-    body += [page.paragraph(f"Not run: {name}. {problem}") for name, problem in table.problems.items()]
+    body += [page.paragraph(remark) for remark in table.remarks()]
     return page.page(table.title, body)
 
 

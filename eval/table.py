@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from hybridreg import wheels
 from hybridreg.data.starts import YawStarts
 from hybridreg.eval import paper, scoring, store
 from hybridreg.eval.paper import Printed
@@ -42,7 +43,8 @@ class Table:
     ----------
     entries : the identity first, then the methods
     starts : turned copies of each pair
-    problems : lines that could not be built, with the reason
+    problems : lines that could not be built or run, with the reason
+    left_out : what some lines did without, for want of a package
     paper : figures that somebody printed, to be shown apart
     """
 
@@ -52,7 +54,13 @@ class Table:
     starts: int
     entries: list[Entry]
     problems: dict[str, str] = field(default_factory=dict)
+    left_out: dict[str, str] = field(default_factory=dict)
     paper: Printed | None = None
+
+    def remarks(self) -> list[str]:
+        """Sentences on what was not run."""
+        without = (f"{name} ran without {text}" for name, text in self.left_out.items())
+        return [*(f"Not run: {name}. {problem}" for name, problem in self.problems.items()), *without]
 
     @property
     def methods(self) -> list[Entry]:
@@ -83,6 +91,7 @@ class Index:
     protocols: tuple[str, ...]
     lines: tuple[str, ...]
     problems: Mapping[str, str]
+    left_out: Mapping[str, str] = field(default_factory=dict)
     paper: Mapping[str, Any] | None = None
 
     def __post_init__(self) -> None:
@@ -137,27 +146,38 @@ def run(
     folder = Path(out)
     (folder / "predictions").mkdir(parents=True, exist_ok=True)
     tried = YawStarts(pairs, recipe.starts, recipe.seed) if recipe.starts else pairs
-    lines = {line.name: line.method for line in recipe.lines if line.method is not None}
-    for name, method in lines.items():
+    problems = {line.name: line.problem for line in recipe.lines if line.method is None}
+    lines: list[str] = []
+    for name, method in ((line.name, line.method) for line in recipe.lines if line.method is not None):
         heard = None if on_row is None else lambda row, name=name: on_row(name, row)
-        predict(
-            method,
-            tried,
-            _file(folder, name),
-            seed=recipe.seed,
-            workers=workers,
-            overwrite=overwrite,
-            data=data,
-            on_row=heard,
-        )
+        try:
+            predict(
+                method,
+                tried,
+                _file(folder, name),
+                seed=recipe.seed,
+                workers=workers,
+                overwrite=overwrite,
+                data=data,
+                on_row=heard,
+            )
+        except ImportError as error:
+            problems[name] = " ".join(str(error).split())
+        else:
+            lines.append(name)
+    if not lines:
+        name, problem = next(iter(problems.items()))
+        raise ValueError(f"none of {len(problems)} lines can be run here; the first, {name}: {problem}")
+    methods = {line.name: line.method for line in recipe.lines}
     index: dict[str, Any] = {
         "title": recipe.title,
         "data": data,
         "seed": recipe.seed,
         "starts": recipe.starts,
         "protocols": [protocol.name for protocol in recipe.protocols],
-        "lines": list(lines),
-        "problems": {line.name: line.problem for line in recipe.lines if line.method is None},
+        "lines": lines,
+        "problems": problems,
+        "left_out": {name: text for name in lines if (text := wheels.left_out(methods[name]))},
         "paper": None if recipe.paper is None else recipe.paper.to_dict(),
     }
     write_json(folder / _INDEX, index)
@@ -182,6 +202,7 @@ def load(folder: str | os.PathLike[str]) -> Table:
         seed=index.seed,
         starts=index.starts,
         problems=dict(index.problems),
+        left_out=dict(index.left_out),
         paper=None if index.paper is None else paper.parse(index.paper),
         entries=_with_identity(entries),
     )

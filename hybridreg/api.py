@@ -29,7 +29,7 @@ def register(
 
     Parameters
     ----------
-    source, target : path, (N, 3+) array, torch tensor, Open3D cloud or PointCloud, in any mix
+    source, target : path, array, table, tensor or object that holds points (`PointCloud.of`), in any mix
         Metres. The source moves, the target stays.
     image : path, (H, W[, C]) array or None
         A photograph of the common view; no calibration. Stages that know no image ignore it.
@@ -38,7 +38,8 @@ def register(
     seed : int
         Fixes every random choice.
     nonfinite : "raise" or "drop"
-        What to do with points that are not finite; the count dropped stands in the result's notes.
+        What to do with points that are missing: not finite, masked, or (dropped, else warned of) at the very origin
+        where many are; the count dropped stands in the result's notes.
     source_viewpoint, target_viewpoint : "auto", "none", (3,), (N, 3), or ((k, 3), (N,))
         Where each sensor stood, in the coordinates of its points; see `PointCloud.of`. Say it for maps, merged clouds
         and vehicle frames: it lets free space speak.

@@ -35,7 +35,7 @@ class PointCloud:
     offset : (3,) float64
         Whole kilometres taken off the coordinates that the user gave; zero for a cloud in its sensor's frame.
     dropped : int
-        Non-finite points left out on request.
+        Points left out on request: not finite, or no returns.
     said : Seen or None
         Where it was seen from, as a caller or a data set says; None puts a place to the test.
     guess : (3,) float64 or None
@@ -63,12 +63,15 @@ class PointCloud:
 
         Parameters
         ----------
-        x : path, (N, 3+) array or nested list, torch tensor, Open3D cloud (legacy or tensor), PointCloud
-            Coordinates in metres in the first three columns.
+        x : path, array, table or object that holds points
+            Arrays and tensors (N, 3+), (3 to 6, N) or (H, W, 3+); records, tables and dictionaries with x, y and z by
+            name; ROS' PointCloud2, laspy's and Open3D's clouds, and whatever else keeps `points` (`hybridreg.held`).
+            Metres, unless a name tells another unit, as `X (mm)`. What is masked or missing is not finite.
         name : str
             What error messages call the cloud.
         nonfinite : "raise" or "drop"
-            What to do with points that are not finite.
+            What to do with points that are not finite. "drop" also leaves out what drivers write where nothing came
+            back, the very origin, where that is 1 % of the points or more; "raise" warns of it.
         viewpoint : "auto", "none", (3,), (N, 3), or ((k, 3), (N,))
             Where the sensor stood, in the coordinates of the points: one place, one for each point, or places and the
             row of each point's. "none" is honest for a map, a CAD model or a merged cloud whose sensors are not known:
@@ -87,9 +90,10 @@ class PointCloud:
         raw = gate.coordinates(x, name)
         place = read_viewpoint(x) if isinstance(x, (str, os.PathLike)) else None
         kept, rows = gate.finite(raw, name, drop=nonfinite == "drop")
+        kept, rows = gate.returned(kept, rows, name, drop=nonfinite == "drop")
         said = given(viewpoint, len(raw), name)
         offset = _whole_kilometres(kept)
-        points = kept - offset
+        points = kept - offset if offset.any() else kept  # a copy of the caller's already
         gate.check(points, name)
         points.setflags(write=False)
         return cls(
@@ -111,7 +115,7 @@ class PointCloud:
 
     @cached_property
     def radii(self) -> Array:
-        """Distances (N,) from the cloud's middle, the shortest first, metres."""
+        """Distances from the cloud's middle, the shortest first, metres: (N,), at most a million."""
         return extent.radii(self.points)
 
     @cached_property
@@ -141,5 +145,5 @@ def _whole_kilometres(points: Array) -> Array:
     # it had, its sensor at the origin again. The median, because a stray return may lie anywhere.
     if len(points) == 0:
         return np.zeros(3)
-    middle = np.median(points, axis=0)
+    middle = np.median(extent.some(points), axis=0)
     return np.where(np.abs(middle) > _MAP_GRID, np.round(middle, -3), 0.0)

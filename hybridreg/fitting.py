@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hybridreg import gate, registry
+from hybridreg import gate, registry, units
 from hybridreg.extent import share_within
 from hybridreg.pair import Pair
 from hybridreg.scene import Scene
@@ -86,12 +86,15 @@ def check_image(pipeline: Pipeline, pair: Pair) -> None:
 
 def check_stage_image(stage: Any, pair: Pair) -> None:
     """Refuse a pair without an image where this stage cannot do without."""
-    if pair.image is None and "image" in _words(stage, "needs"):
+    if not pair.has_image and "image" in _words(stage, "needs"):
         raise ValueError(f"pair {pair.id}: {_label(stage)} needs an image; pass image=...")
 
 
 def check_scene(scene: Scene) -> None:
     """Refuse levels that are too small to register; warn of a unit or a voxel that is evidently wrong."""
+    doubts = units.doubts(scene.pair)
+    for name, text in doubts.items():
+        _warn(f"{name}: {text}")
     for name, cloud, level in (
         ("source", scene.pair.source, scene.source),
         ("target", scene.pair.target, scene.target),
@@ -101,6 +104,8 @@ def check_scene(scene: Scene) -> None:
                 f"{name}: {len(level)} of {len(cloud)} points are left after downsampling to {level.spacing:.3g} m, "
                 f"fewer than {gate.MIN_POINTS}; choose a smaller voxel"
             )
+        if doubts:  # one sentence tells the cloud to blame
+            continue
         low, high = cloud.bounds
         extent = high - low
         axis = int(np.argmax(extent))

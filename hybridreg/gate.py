@@ -4,10 +4,14 @@
 from __future__ import annotations
 
 import os
+import warnings
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from hybridreg.held import points_of
 
 Array = NDArray[np.float64]
 
@@ -16,6 +20,8 @@ MIN_POINTS = 20
 _LARGEST = 1.5e11
 # A cloud thinner than a millionth of its length in two directions fixes no rotation about that length.
 _THINNEST = 1e-6
+_LOT = 2**18  # points
+_FILLED = 0.01  # share of points in the very origin from which they are no returns
 
 
 def coordinates(x: Any, name: str) -> Array:
@@ -24,43 +30,21 @@ def coordinates(x: Any, name: str) -> Array:
         from hybridreg.io import read_points
 
         return read_points(x)
-    array = _as_array(x, name)
-    if array.dtype.kind not in "fiu":
-        raise ValueError(
-            f"{name}: coordinates must be numbers, got dtype {array.dtype}; convert with astype(float)"
-        )
-    if array.size == 0:
-        raise ValueError(
-            f"{name}: the cloud is empty (shape {array.shape}); it needs at least {MIN_POINTS} points"
-        )
-    upright = array.ndim == 2 and array.shape[1] >= 3
-    lying = array.ndim == 2 and array.shape[0] == 3 and array.shape[1] >= MIN_POINTS
-    if lying or not upright:
-        hint = "; transpose it" if lying else ""
-        raise ValueError(f"{name}: expected an array of shape (N, 3), got {array.shape}{hint}")
-    with np.errstate(over="ignore"):  # a long double beyond float64 becomes infinite, and is refused as such
-        return np.array(array[:, :3], dtype=np.float64)
-
-
-def _as_array(x: Any, name: str) -> NDArray[Any]:
     try:
-        array = np.asarray(_held_by(x))
+        return points_of(x, name)
+    except (ValueError, MemoryError) as error:
+        if str(error).startswith(f"{name}: "):
+            raise
+        raise _unreadable(x, name, error) from error
     except Exception as error:  # the object is somebody else's, and may raise whatever it likes
-        raise ValueError(
-            f"{name}: cannot read an array of shape (N, 3) from {type(x).__name__}: {error}"
-        ) from error
-    return array
+        raise _unreadable(x, name, error) from error
 
 
-def _held_by(x: Any) -> Any:
-    if hasattr(x, "detach"):  # torch tensor, on any device
-        x = x.detach().cpu()
-        # numpy has no bfloat16, and float64 holds every other float exactly.
-        return (x.double() if x.is_floating_point() else x).numpy()
-    if hasattr(x, "point") and hasattr(x, "to_legacy"):  # Open3D tensor cloud
-        # One without points has no positions either.
-        return x.point["positions"].cpu().numpy() if "positions" in x.point else np.empty((0, 3))
-    return x.points if hasattr(x, "points") else x  # Open3D legacy cloud, or anything shaped like one
+def _unreadable(x: Any, name: str, error: Exception) -> ValueError:
+    return ValueError(
+        f"{name}: cannot read points from {type(x).__name__}: {error}; pass an array of shape (N, 3), such as "
+        "numpy.column_stack([x, y, z])"
+    )
 
 
 def finite(points: Array, name: str, *, drop: bool) -> tuple[Array, NDArray[np.bool_] | None]:
@@ -79,6 +63,31 @@ def finite(points: Array, name: str, *, drop: bool) -> tuple[Array, NDArray[np.b
     return points[good], good
 
 
+def returned(
+    points: Array, rows: NDArray[np.bool_] | None, name: str, *, drop: bool
+) -> tuple[Array, NDArray[np.bool_] | None]:
+    """Warn of many points exactly at (0, 0, 0), which drivers write where nothing came back; or leave them out where
+    that was asked for. `rows` (N,) are those that `finite` left, and what is returned is as it returns."""
+    fewest = max(MIN_POINTS, _FILLED * len(points))
+    if np.count_nonzero(points[:, 0] == 0.0) < fewest:
+        return points, rows
+    good = points.any(axis=1)
+    n_bad = len(points) - int(good.sum())
+    if n_bad < fewest or n_bad == len(points):
+        return points, rows
+    if not drop:
+        warnings.warn(
+            f"{name}: {n_bad} of {len(points)} points lie exactly at (0, 0, 0), which drivers write where nothing came "
+            'back; remove them or pass nonfinite="drop"',
+            UserWarning,
+            stacklevel=4,
+        )
+        return points, rows
+    kept = np.ones(len(points), dtype=bool) if rows is None else rows.copy()
+    kept[kept] = good
+    return points[good], kept
+
+
 def check(points: Array, name: str) -> None:
     """Refuse clouds that no pose can be computed from.
 
@@ -92,21 +101,32 @@ def check(points: Array, name: str) -> None:
         raise ValueError(f"{name}: the cloud is empty; it needs at least {MIN_POINTS} points")
     if len(points) < MIN_POINTS:
         raise ValueError(f"{name}: {len(points)} points are too few; it needs at least {MIN_POINTS}")
-    # Along three rows numpy reduces several times as fast as along three columns.
-    rows = np.ascontiguousarray(points.T)
-    largest = float(np.abs(rows).max())
+    low, high, middle = _reach(points)
+    largest = float(max(np.abs(low).max(), np.abs(high).max()))
     if largest > _LARGEST:
         raise ValueError(
             f"{name}: a coordinate of {largest:.3g} m cannot be real; check the file and its unit"
         )
-    centred = rows - rows.mean(axis=1, keepdims=True)
-    extent = np.ptp(rows, axis=1)
-    if not extent.max() > 1e-9 * max(largest, 1e-300):
+    longest = float((high - low).max())
+    if not longest > 1e-9 * max(largest, 1e-300):
         raise ValueError(
             f"{name}: all {len(points)} points lie in one place; a pose needs points spread in space"
         )
-    spread = np.linalg.svd(centred @ centred.T / extent.max() ** 2, compute_uv=False)
+    scatter = sum(centred @ centred.T for rows in _lots(points) for centred in [(rows - middle) / longest])
+    spread = np.linalg.svd(scatter, compute_uv=False)
     if spread[1] <= _THINNEST**2 * spread[0]:
         raise ValueError(
             f"{name}: all {len(points)} points lie on one line; the rotation about it is free, add points off the line"
         )
+
+
+def _lots(points: Array) -> Iterator[Array]:
+    # Along three rows numpy reduces several times as fast as along three columns; in lots no copy of all is made.
+    return (np.ascontiguousarray(points[k : k + _LOT].T) for k in range(0, len(points), _LOT))
+
+
+def _reach(points: Array) -> tuple[Array, Array, Array]:
+    """Lower and upper corner (3,), and middle (3, 1)."""
+    lots = [(rows.min(axis=1), rows.max(axis=1), rows.sum(axis=1)) for rows in _lots(points)]
+    low, high, total = (np.array(each) for each in zip(*lots, strict=True))
+    return low.min(axis=0), high.max(axis=0), total.sum(axis=0)[:, None] / len(points)

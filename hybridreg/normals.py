@@ -11,6 +11,7 @@ from scipy.spatial import cKDTree
 
 from hybridreg.resources import n_workers
 from hybridreg.scene import Level, Scene
+from hybridreg.wheels import load
 
 Array = NDArray[np.float64]
 Side = Literal["source", "target"]
@@ -38,8 +39,7 @@ def estimate(points: Array, viewpoint: Array | None, k: int = 20) -> Array:
     not known. The wheel of
     small_gicp computes them four times as fast as numpy does.
     """
-    import small_gicp
-
+    small_gicp = load("small_gicp", "every estimate of normals")
     k = min(k, len(points))
     # All neighbours several times over tell the same.
     times = -(-_FEWEST // k)

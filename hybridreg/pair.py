@@ -5,7 +5,8 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
@@ -13,6 +14,7 @@ from numpy.typing import NDArray
 
 from hybridreg import se3
 from hybridreg.cloud import PointCloud
+from hybridreg.photograph import Photograph
 from hybridreg.viewpoint import Given
 
 Array = NDArray[np.float64]
@@ -28,7 +30,8 @@ class Pair:
     source, target : PointCloud
         The source moves, the target stays.
     image : (H, W, 3) uint8 or None
-        One photograph of the common view, uncalibrated, RGB.
+        One photograph of the common view, uncalibrated, RGB. Made of a path, it is decoded when it is first looked at;
+        `has_image` does not look.
     id : str
         Seeds the pair's random generator together with the run's seed.
     meta : mapping
@@ -40,10 +43,23 @@ class Pair:
 
     source: PointCloud
     target: PointCloud
-    image: NDArray[np.uint8] | None = None
+    image: NDArray[np.uint8] | None = Photograph()  # type: ignore[assignment]  # noqa: RUF009
     id: str = "pair"
     meta: Mapping[str, Any] = field(default_factory=dict)
     gravity: Gravity = "known"
+
+    def with_clouds(self, source: PointCloud, target: PointCloud) -> Pair:
+        """The same pair of other clouds."""
+        return self.replaced(source=source, target=target)
+
+    def replaced(self, **changes: Any) -> Pair:
+        """The same pair with some fields changed; an image that was not decoded yet still is not."""
+        return replace(self, **{"image": Photograph.held_by(self), **changes})
+
+    @property
+    def has_image(self) -> bool:
+        """Whether there is a photograph."""
+        return Photograph.held_by(self) is not None
 
     @classmethod
     def of(
@@ -93,7 +109,10 @@ class LabelledPair:
         se3.check(self.T_target_source, f"pair {self.pair.id}: T_target_source")
 
 
-def _image(image: Any) -> NDArray[np.uint8]:
-    from hybridreg.io import as_image, read_image
+def _image(image: Any) -> Any:
+    from hybridreg.io import as_image, check_image
 
-    return read_image(image) if isinstance(image, (str, os.PathLike)) else as_image(image)
+    if not isinstance(image, (str, os.PathLike)):
+        return as_image(image)
+    check_image(image)
+    return Path(image)

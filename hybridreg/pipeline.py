@@ -169,11 +169,13 @@ class Pipeline(Stage):
         with stopwatch(seconds, "downsample"):
             scene = self.downsample(pair)
         fitting.check_scene(scene)
-        for name, cloud in (("source", pair.source), ("target", pair.target)):
+        for name, cloud in (("source", scene.pair.source), ("target", scene.pair.target)):
             if len(cloud.seen.places) != 1:
                 scene.note(f"the {name} was seen from {_places(cloud)}")
             if cloud.dropped:
-                scene.note(f"{cloud.dropped} points of the {name} were not finite and were dropped")
+                scene.note(
+                    f"{cloud.dropped} points of the {name} were missing (not finite, or at 0, 0, 0) and were dropped"
+                )
         with stopwatch(seconds, "overlap"):
             overlap = self.overlap(scene)
         with stopwatch(seconds, "match"):

@@ -22,7 +22,9 @@ from hybridreg.learned.config import NetworkConfig
 from hybridreg.learned.network import RegistrationNetwork
 from hybridreg.learned.official_names import official_name
 from hybridreg.learned.sizes import named_config
-from hybridreg.shipped_weights import CONFIG_FILE, WEIGHTS_FILE, find, names
+from hybridreg.shipped_weights import CONFIG_FILE, WEIGHTS_FILE, MissingWeights, find, names
+
+_FLOATS = (torch.float64, torch.float32, torch.float16, torch.bfloat16)
 
 Config = TypeVar("Config")
 
@@ -53,9 +55,10 @@ def from_pretrained(name_or_folder: str | os.PathLike[str]) -> RegistrationNetwo
     Raises
     ------
     FileNotFoundError
-        No such folder and no such name; the message lists the names.
+        No such folder and no such name (`MissingWeights`); the message lists the names.
     ValueError
-        A file is damaged, or a tensor is missing, superfluous, of another shape or not finite: it is named.
+        A file is damaged, or a tensor is missing, superfluous, of another shape, no float of 16 bits or more, not
+        finite, or a weight of zeros only: it is named.
     """
     config, tensors, origin = read_folder(name_or_folder, None, NetworkConfig.from_dict)
     network = RegistrationNetwork(config)
@@ -113,7 +116,7 @@ def _find(name_or_folder: str | os.PathLike[str]) -> Path:
     folder = find(name_or_folder)
     if folder is not None:
         return folder
-    raise FileNotFoundError(
+    raise MissingWeights(
         f"no {CONFIG_FILE} and {WEIGHTS_FILE} in {os.fspath(name_or_folder)!r}, and no shipped weights "
         f"of that name; shipped are: {', '.join(names()) or 'none'}"
     )
@@ -125,14 +128,28 @@ def load_tensors(module: nn.Module, tensors: Mapping[str, Tensor], origin: str) 
     wrong = [f"{name} is missing" for name in expected if name not in tensors]
     wrong += [f"{name} is not part of this network" for name in tensors if name not in expected]
     for name, tensor in tensors.items():
-        if name in expected and tensor.shape != expected[name].shape:
-            wrong.append(f"{name} has shape {tuple(tensor.shape)}, not {tuple(expected[name].shape)}")
-        elif name in expected and not bool(torch.isfinite(tensor).all()):
-            wrong.append(f"{name} holds values that are not finite")
+        if name in expected and (fault := _fault(name, tensor, expected[name])):
+            wrong.append(f"{name} {fault}")
     if wrong:
         more = f" (and {len(wrong) - 1} more)" if len(wrong) > 1 else ""
         raise ValueError(f"{origin}: tensor {wrong[0]}{more}")
     module.load_state_dict(dict(tensors), strict=True)
+
+
+def _fault(name: str, tensor: Tensor, expected: Tensor) -> str:
+    """What is wrong with a tensor; empty if nothing is."""
+    if tensor.shape != expected.shape:
+        return f"has shape {tuple(tensor.shape)}, not {tuple(expected.shape)}"
+    if not expected.is_floating_point():
+        return "" if tensor.dtype == expected.dtype else f"is {tensor.dtype}, not {expected.dtype}"
+    if tensor.dtype not in _FLOATS:
+        # Whole numbers and eight bits are quantised: they mean nothing without the scale that they lack here.
+        return f"is {tensor.dtype}; store it as float32, float16 or bfloat16"
+    if not bool(torch.isfinite(tensor).all()):
+        return "holds values that are not finite"
+    if (tensor.ndim > 1 or name.endswith("weight")) and tensor.numel() > 1 and not bool(tensor.any()):
+        return "holds zeros only"
+    return ""
 
 
 def load_official(

@@ -267,7 +267,7 @@ def test_dropped_points_stand_in_the_result(courtyard: tuple[hr.Pair, np.ndarray
     source = courtyard[0].source.points.copy()
     source[5:8, 1] = np.nan
     result = hr.register(source, courtyard[0].target.points, preset="icp", voxel=0.5, nonfinite="drop")
-    assert "3 points of the source were not finite and were dropped" in result.notes
+    assert "3 points of the source were missing (not finite, or at 0, 0, 0) and were dropped" in result.notes
     with pytest.raises(ValueError, match="source: 3 of"):
         hr.register(source, courtyard[0].target.points, preset="icp", voxel=0.5)
 

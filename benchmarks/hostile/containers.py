@@ -10,13 +10,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks.hostile import objects
+
 Array = NDArray[np.float64]
 
 
 def contain(points: Array, name: str) -> Any:
     """Points (n, 3) in a container of that name."""
     with np.errstate(all="ignore"):
-        return _MAKE[name](points)
+        return (_MAKE | objects.MAKE)[name](points)
 
 
 def _torch(points: Array, dtype: str, **options: Any) -> Any:
@@ -134,7 +136,7 @@ _MAKE: dict[str, Callable[[Array], Any]] = {
     "open3d empty tensor": _empty_tensor_cloud,
 }  # fmt: skip
 
-CONTAINERS = tuple(_MAKE)
+CONTAINERS = (*_MAKE, *objects.MAKE)
 TAKEN = ("float32", "float16", "big endian", "list", "fortran", "strided", "reversed", "read-only", "four columns",
-         "masked", "namespace", "torch float", "torch bfloat16", "open3d", "open3d tensor")  # fmt: skip
+         "masked", "namespace", "torch float", "torch bfloat16", "open3d", "open3d tensor", *objects.TAKEN)  # fmt: skip
 """Those that hold points which the library reads."""

@@ -141,8 +141,12 @@ def _compressed_pcd() -> bytes:
 
 
 def _npy() -> bytes:
+    return _saved(_cloud())
+
+
+def _saved(array: np.ndarray) -> bytes:
     stream = io.BytesIO()
-    np.save(stream, _cloud())
+    np.save(stream, array)
     return stream.getvalue()
 
 
@@ -190,5 +194,40 @@ _SAMPLES: dict[str, Callable[[], bytes]] = {
     "plain las": lambda: _las(False),
     "packed laz": lambda: _las(True),
     "empty ply": lambda: b"",
+    "three-number bin": lambda: _rows(3),
+    "six-number bin": lambda: _rows(6),
+    "cloudcompare bin": lambda: b"CCB2" + _rows(4),
+    "counted pts": lambda: f"{len(_cloud())}\n".encode() + _text(" ", ""),
+    "cloudcompare asc": lambda: _text(" ", "//X Y Z\n"),
+    "plain xyzn": lambda: _text(" ", ""),
+    "plain xyzrgb": lambda: _text(" ", ""),
+    "millimetre csv": lambda: _text(",", "X (mm), Y (mm), Z (mm)\n"),
+    "unit txt": lambda: _text(" ", "# unit: cm\n"),
+    "degree csv": lambda: _text(",", "lon,lat,h\n"),
+    "comma txt": lambda: _text("\t", "").replace(b".", b","),
+    "tabbed tsv": lambda: _text("\t", "Points:0\tPoints:1\tPoints:2\n"),
+    "grid asc": lambda: b"ncols 3\nnrows 2\nxllcorner 0\n" + _text(" ", ""),
+    "structured npy": lambda: _saved(np.rec.fromarrays(_cloud().T, names="z,x,y")),
+    "transposed npy": lambda: _saved(_cloud().T),
+    "organised npy": lambda: _saved(_cloud()[: len(_cloud()) // 20 * 20].reshape(20, -1, 3)),
+    "mesh stl": lambda: b"solid",
+    "table parquet": lambda: b"PAR1",
 }
-_SUFFIXES = (".ply", ".PCD", ".npy", ".npz", ".bin", ".txt", ".csv", ".las", ".laz", ".jpg", ".pcd.bin", "")
+_SUFFIXES = (
+    ".ply",
+    ".PCD",
+    ".npy",
+    ".npz",
+    ".bin",
+    ".txt",
+    ".csv",
+    ".las",
+    ".laz",
+    ".jpg",
+    ".pcd.bin",
+    ".asc",
+    ".pts",
+    ".e57",
+    ".tsv",
+    "",
+)

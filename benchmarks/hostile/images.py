@@ -3,7 +3,9 @@
 
 from __future__ import annotations
 
+import struct
 import tempfile
+import zlib
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -119,8 +121,12 @@ def encoded(sample: str) -> bytes:
     import cv2
 
     _, suffix, kind = sample.split()
+    if kind == "bomb":  # it promises 900 megapixels
+        head = b"IHDR" + struct.pack(">IIBBBBB", 30_000, 30_000, 8, 2, 0, 0, 0)
+        crc = struct.pack(">I", zlib.crc32(head))
+        return b"\x89PNG\r\n\x1a\n" + struct.pack(">I", 13) + head + crc + encoded("a png colour")[33:]
     pixels = filled((48, 64, 3) if kind == "colour" else (48, 64), "u1", "noise")
-    return cv2.imencode(f".{suffix}", pixels)[1].tobytes()
+    return bytes(np.asarray(cv2.imencode(f".{suffix}", pixels)[1], dtype=np.uint8))
 
 
 @cache
@@ -135,9 +141,10 @@ def _network() -> Pipeline:
 _SAMPLES = (
     *(
         f"a {suffix} {kind}"
-        for suffix in ("png", "jpg", "bmp", "tiff", "webp")
+        for suffix in ("png", "jpg", "bmp", "tiff", "webp", "gif", "avif")
         for kind in ("grey", "colour")
     ),
     "a pgm grey",
     "a ppm colour",
+    "a png bomb",
 )

@@ -15,6 +15,11 @@ from hypothesis import strategies as st
 from benchmarks.hostile.damage import Damage, damaged, damages
 from benchmarks.hostile.mutate import Change, changed, changes
 
+# The first three are fine, and drawn as often as all others.
+SPOILS = (
+    *("float16", "bfloat16", "float64") * 3,
+    *("nan", "inf", "zeros", "int8", "int64", "bool", "float8_e4m3fn", "float8_e5m2"),
+)
 FILES = ("config.json", "model.safetensors", "checkpoint.pth.tar")
 
 
@@ -28,6 +33,7 @@ class WeightsCase:
     file: str
     change: tuple[Change, ...] = ()
     damage: tuple[Damage, ...] = ()
+    spoilt: tuple[int, str] | None = None  # which tensor, and what becomes of it
 
     def run(self) -> str:
         """Load the network."""
@@ -40,6 +46,8 @@ class WeightsCase:
             content = damaged(_saved()[self.file], self.damage)
             if self.change and self.file == FILES[0]:
                 content = json.dumps(changed(json.loads(content), self.change), default=str).encode()
+            if self.spoilt is not None:
+                content = _spoil(content, *self.spoilt)
             (folder / self.file).write_bytes(content)
             if self.file == FILES[2]:
                 load_official(folder / self.file, "nano")
@@ -53,7 +61,25 @@ def cases() -> st.SearchStrategy[WeightsCase]:
     return st.one_of(
         st.builds(WeightsCase, file=st.just(FILES[0]), change=changes()),
         st.builds(WeightsCase, file=st.sampled_from(FILES), damage=damages()),
+        st.builds(
+            WeightsCase,
+            file=st.just(FILES[1]),
+            spoilt=st.tuples(st.integers(0, 500), st.sampled_from(SPOILS)),
+        ),
     )
+
+
+def _spoil(content: bytes, which: int, how: str) -> bytes:
+    import torch
+    from safetensors.torch import load, save
+
+    tensors = load(content)
+    name = sorted(tensors)[which % len(tensors)]
+    made = tensors[name] * {"nan": float("nan"), "inf": float("inf"), "zeros": 0.0}.get(how, 1.0)
+    tensors[name] = (
+        made.to(getattr(torch, how)) if hasattr(torch, how) and how not in ("nan", "inf", "zeros") else made
+    )
+    return save(tensors)
 
 
 @cache

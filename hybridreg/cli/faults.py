@@ -11,6 +11,8 @@ from typing import ParamSpec
 
 import typer
 
+from hybridreg.cli.spoken import spoken
+
 BAD_INPUT, VERDICT_FAILED = 2, 3
 
 P = ParamSpec("P")
@@ -27,7 +29,7 @@ def plainly(command: Callable[P, None]) -> Callable[P, None]:
             try:
                 command(*args, **kwargs)
             except (ValueError, KeyError, OSError, ImportError) as error:
-                print(f"hybridreg: {sentence(error)}", file=sys.stderr)
+                print(f"hybridreg: {spoken(sentence(error))}", file=sys.stderr)
                 raise typer.Exit(BAD_INPUT) from None
 
     return wrapped
@@ -44,4 +46,4 @@ def sentence(error: Exception) -> str:
 
 
 def _show_warning(message: Warning | str, *_: object, **__: object) -> None:
-    print(f"hybridreg: warning: {message}", file=sys.stderr)
+    print(f"hybridreg: warning: {spoken(str(message))}", file=sys.stderr)

@@ -11,6 +11,7 @@ import typer
 
 from hybridreg.cli import options
 from hybridreg.cli.faults import VERDICT_FAILED, plainly
+from hybridreg.cli.spoken import spoken
 
 if TYPE_CHECKING:
     from hybridreg.result import RegistrationResult
@@ -80,6 +81,6 @@ def show(result: RegistrationResult) -> None:
     for reason in result.reasons:
         print(f"  - {reason}")
     for note in result.notes:
-        print(f"note: {note}")
+        print(f"note: {spoken(note)}")
     stages = ", ".join(f"{stage} {seconds:.3f}" for stage, seconds in result.seconds.items())
     print(f"seconds: {stages}; together {sum(result.seconds.values()):.3f}")

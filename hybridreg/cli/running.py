@@ -58,8 +58,8 @@ def write(
         print_table(done.caption(protocol), formats.tables(done, protocol)["Results"])
     if done.paper is not None:
         print_table(done.paper.heading(), done.paper.cells())
-    for name, problem in done.problems.items():
-        print(f"not run: {name}. {problem}")
+    for remark in done.remarks():
+        print(remark)
     files = report.write(done, protocols, out, pairs)
     print(f"written to {out}: {', '.join(file.name for file in files)}")
 

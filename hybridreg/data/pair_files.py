@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from hybridreg.cloud import PointCloud
 from hybridreg.data.pth import read_pth
-from hybridreg.io import read_image, read_points
+from hybridreg.io import check_image, read_points
 from hybridreg.pair import LabelledPair, Pair
 
 Array = NDArray[np.float64]
@@ -56,7 +56,7 @@ class PairFiles:
         pair = Pair(
             source=read_scan(self.source, f"{self.id} source", self.source_sensor),
             target=read_scan(self.target, f"{self.id} target", self.target_sensor),
-            image=None if self.image is None else read_image(self.image),
+            image=None if self.image is None else _checked(self.image),
             id=self.id,
             meta=dict(self.facts),
         )
@@ -107,6 +107,12 @@ class PairTable(Sequence[PairFiles]):
             target_sensor=self._sensors[index][1],
             facts=facts or {},
         )
+
+
+def _checked(image: Path) -> Any:
+    # Decoded when a stage looks at it.
+    check_image(image)
+    return image
 
 
 def read_scan(path: Path, name: str, sensor: str = "") -> PointCloud:

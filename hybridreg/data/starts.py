@@ -61,6 +61,6 @@ def turned(labelled: LabelledPair, yaw_deg: float, id: str) -> LabelledPair:
     turn[:3, 3] = offset - turn[:3, :3] @ offset
     return dataclasses.replace(
         labelled,
-        pair=dataclasses.replace(pair, source=source, id=id),
+        pair=pair.replaced(source=source, id=id),
         T_target_source=labelled.T_target_source @ se3.inverse(turn),
     )

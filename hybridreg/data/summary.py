@@ -104,7 +104,7 @@ class _Seen:
             T=labelled.T_target_source,
             overlap=overlap(labelled, radius),
             inverse_overlap=overlap(labelled, radius, inverted=True),
-            has_image=labelled.pair.image is not None,
+            has_image=labelled.pair.has_image,
             roles={
                 side: (_sensor(labelled, side), azimuth.coverage(c.points).role) for side, c in clouds.items()
             },

@@ -12,9 +12,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from hybridreg.io.faults import fault
 from hybridreg.io.files import read_whole
+from hybridreg.io.image_size import image_size
 from hybridreg.io.signatures import kind_of
 
 _NOT_AN_IMAGE = "give a photograph that an image viewer opens (.png, .jpg, .tif, .bmp, .webp)"
+# The largest sensors of telephones have 200 million; decoded they take 0.6 GB, twice that on the way.
+_MOST_PIXELS = 210_000_000
+_ROWS = 256
 _ROUNDING = 1e-6  # by which a float image may leave [0, 1]
 
 
@@ -37,20 +41,51 @@ def read_image(path: str | os.PathLike[str]) -> NDArray[np.uint8]:
     FileNotFoundError, IsADirectoryError
         Nothing, or a folder, lies at `path`.
     ValueError
-        The file is no image, or is truncated.
+        The file is no image, is truncated, or has more than 210 million pixels, which are not decoded then.
     """
     name = str(path)
-    data = read_whole(Path(path))
+    data = _checked(Path(path))
+    pixels = _decode(data)
+    if pixels is None:
+        raise _undecodable(data, name)
+    return as_image(pixels[..., ::-1] if pixels.ndim == 3 else pixels, name)
+
+
+def check_image(path: str | os.PathLike[str]) -> None:
+    """Refuse what is no photograph, is cut short, or has too many pixels, by its header alone.
+
+    Raises
+    ------
+    FileNotFoundError, IsADirectoryError, ValueError
+        As `read_image`, but for damage that only a decoder meets.
+    """
+    _checked(Path(path))
+
+
+def _checked(path: Path) -> bytes:
+    name, data = str(path), read_whole(path)
     if not data:
         raise fault(name, "is empty (0 bytes)")
     if data.startswith(b"\xff\xd8\xff") and not _jpeg_is_whole(data):
         raise fault(name, f"breaks off within the JPEG data, after {len(data)} bytes")
-    pixels = _decode(data)
-    if pixels is None:
-        kind = kind_of(data)
-        what = f"its content is {kind.words}" if kind else f"begins with {data[:8]!r}"
-        raise fault(name, f"cannot be decoded as an image: {what}, {len(data)} bytes", _NOT_AN_IMAGE)
-    return as_image(pixels[..., ::-1] if pixels.ndim == 3 else pixels, name)
+    size = image_size(data)
+    if size is None:
+        raise _undecodable(data, name)
+    rows, columns = size
+    if rows * columns > _MOST_PIXELS:
+        problem = f"has {columns} x {rows} pixels, {rows * columns / 1e6:.0f} megapixels"
+        raise fault(
+            name,
+            problem,
+            f"make it smaller: {_MOST_PIXELS / 1e6:.0f} are read, networks look at less than one",
+        )
+    return data
+
+
+def _undecodable(data: bytes, name: str) -> ValueError:
+    kind = kind_of(data)
+    what = f"its content is {kind.words}" if kind else f"begins with {data[:8]!r}"
+    return fault(name, f"cannot be decoded as an image: {what}, {len(data)} bytes", _NOT_AN_IMAGE)
 
 
 def as_image(image: ArrayLike, name: str = "image") -> NDArray[np.uint8]:
@@ -97,7 +132,10 @@ def _eight_bits(pixels: NDArray[Any], name: str) -> NDArray[Any]:
     if pixels.dtype == np.uint8:
         return pixels
     if pixels.dtype.kind == "u" and pixels.dtype.itemsize == 2:
-        return (pixels.astype(np.uint32) * 255 + 32767) // 65535
+        rounded = np.empty(pixels.shape, dtype=np.uint8)
+        for row in range(0, len(pixels), _ROWS):  # so that no copy of four bytes each is made of all
+            rounded[row : row + _ROWS] = (pixels[row : row + _ROWS].astype(np.uint32) * 255 + 32767) // 65535
+        return rounded
     if pixels.dtype.kind != "f":
         cure = "give uint8, uint16 or floats in [0, 1]; for values up to 255 use image.astype(numpy.uint8)"
         raise fault(name, f"has the dtype {pixels.dtype}", cure)

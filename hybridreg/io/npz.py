@@ -9,8 +9,9 @@ import zipfile
 import numpy as np
 from numpy.typing import NDArray
 
+from hybridreg.io.arrays import array_points
 from hybridreg.io.faults import fault, foreign_parser
-from hybridreg.io.npy import array_of_npy, array_points, npy_header
+from hybridreg.io.npy import array_of_npy, npy_header
 
 _KEYS = ("xyz", "points", "arr_0")
 # Coordinates hardly compress (up to 20 times on a coarse grid); noise of zeros compresses a thousandfold.

@@ -24,6 +24,22 @@ from hybridreg.io.text import parse_text
 # Bytes in which the header of a PCD file ends.
 _HEADER = 65_536
 
+# Files that hold points or surfaces, and are not read: what to do instead.
+_MESH = "sample its surface first (for example trimesh.load(file, force='mesh').sample(100_000)) and save that as .npy"
+_FRAME = "save it as .csv, or in Python read it with pandas and pass the DataFrame"
+_ELSEWHERE = {
+    ".e57": "export it as .ply or .las, for example with CloudCompare",
+    ".ptx": "export it as .ply or .pts, for example with CloudCompare",
+    ".rcp": "export it as .pts or .e57 in ReCap, and that as .ply",
+    ".bag": "export one scan of it as .pcd or .npy",
+    ".mcap": "export one scan of it as .pcd or .npy",
+    ".pcap": "convert one frame with the sensor's own tool to .csv, .pcd or .las",
+    ".mat": "save the array in it as .csv or .npy",
+    ".h5": "save the array in it as .npy",
+    **dict.fromkeys((".stl", ".obj", ".off", ".glb", ".gltf"), _MESH),
+    **dict.fromkeys((".feather", ".parquet", ".arrow"), _FRAME),
+}
+
 Parser = Callable[[bytes, str], NDArray[np.float64]]
 
 PARSERS: dict[str, Parser] = {
@@ -32,9 +48,9 @@ PARSERS: dict[str, Parser] = {
     ".bin": parse_bin,
     ".npy": parse_npy,
     ".npz": parse_npz,
-    ".xyz": parse_text,
-    ".txt": parse_text,
-    ".csv": parse_text,
+    **dict.fromkeys(
+        (".xyz", ".txt", ".csv", ".tsv", ".asc", ".pts", ".xyzn", ".xyzrgb", ".xyzi"), parse_text
+    ),
     ".las": parse_las,
     ".laz": parse_las,
 }
@@ -42,13 +58,13 @@ PARSERS: dict[str, Parser] = {
 
 
 def read_points(path: str | os.PathLike[str]) -> NDArray[np.float64]:
-    """Read the coordinates of a point cloud, in the file's own unit and frame.
+    """Read the coordinates of a point cloud, in the file's own frame; metres where it tells another unit.
 
     The file name's ending chooses the format: `.ply` (ascii, binary), `.pcd` (ascii, binary,
-    binary_compressed), `.bin` (float32 rows of four as in KITTI, or of five as in nuScenes' `.pcd.bin`),
-    `.npy`, `.npz` (array `xyz`, `points`, `arr_0` or the only one that fits), `.xyz`/`.txt`/`.csv`,
-    `.las`/`.laz` (extra `las`). A file that is not what its name says is refused. Rows that are not finite
-    are kept: the gate decides about them.
+    binary_compressed), `.bin` (float32 rows of three to six numbers, as KITTI and nuScenes have four and five),
+    `.npy`, `.npz` (array `xyz`, `points`, `arr_0` or the only one that fits), text (`.xyz`, `.txt`, `.csv`, `.tsv`,
+    `.asc`, `.pts`, `.xyzn`, `.xyzrgb`, `.xyzi`), `.las`/`.laz` (extra `las`).
+    A file that is not what its name says is refused. Rows that are not finite are kept: the gate decides about them.
 
     Parameters
     ----------
@@ -102,7 +118,10 @@ def parse_points(data: bytes, name: str) -> NDArray[np.float64]:
 def _parser_for(name: str) -> Parser:
     suffix = _suffix(name)
     if suffix not in PARSERS:
-        raise fault(name, f"there is no reader for {suffix!r}", f"convert it to one of {', '.join(PARSERS)}")
+        cure = f"; {_ELSEWHERE[suffix]}" if suffix in _ELSEWHERE else ""
+        raise fault(
+            name, f"there is no reader for {suffix!r}{cure}", f"what is read ends in {', '.join(PARSERS)}"
+        )
     return PARSERS[suffix]
 
 

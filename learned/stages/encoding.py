@@ -26,8 +26,8 @@ def encode(scene: Scene, stage: NetworkStage) -> Encoding:
 
 def _encode(scene: Scene, stage: NetworkStage) -> Encoding:
     network = stage.network()
-    if network.image_encoder is not None and not (stage.sees() and scene.pair.image is not None):
-        why = "no image" if scene.pair.image is None else "the network was trained without images"
+    if network.image_encoder is not None and not (stage.sees() and scene.pair.has_image):
+        why = "no image" if not scene.pair.has_image else "the network was trained without images"
         scene.note(f"{why}: features come from the clouds alone, a learned token in the image's place")
     # Cylindrical kernel points take z for the vertical, and sensors may hang in any way. The ground tells which,
     # unless a wall was taken for it: both are tried.

@@ -10,6 +10,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from hybridreg.io.atomic import write_text
+from hybridreg.io.cells import cell
 
 Value = str | int | float
 
@@ -52,4 +53,4 @@ class CurveFile:
 
 
 def _short(value: Value) -> str:
-    return f"{value:.6g}" if isinstance(value, float) else str(value)
+    return f"{value:.6g}" if isinstance(value, float) else str(cell(value))

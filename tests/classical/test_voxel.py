@@ -5,13 +5,15 @@ from collections import defaultdict
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hybridreg import Pair, VoxelGrid
-from hybridreg.classical import voxel as module
+from hybridreg import Pair, Pipeline, PointCloud, VoxelGrid
+from hybridreg.classical import cells as cells_of
+from hybridreg.classical import thinning
 from hybridreg.classical.voxel import voxel_centroids
 from hybridreg.resolution import default_voxel
+from hybridreg.testing import sample_pair
 
 clouds = st.builds(
     lambda seed, n, spread: np.random.default_rng(seed).normal(size=(n, 3)) * spread,
@@ -53,9 +55,56 @@ def test_keeps_the_centre_of_mass(points: np.ndarray, voxel: float) -> None:
 @given(st.lists(st.integers(0, 50), min_size=1, max_size=200))
 def test_cells_too_many_for_the_quick_way_are_ranked_alike(cells: list[int]) -> None:
     key = np.array(cells, dtype=np.int64)
-    quick, slow = module._members(key, 51), module._members(key, 2**62)
-    assert np.array_equal(quick[0], slow[0])
-    assert quick[1] == slow[1] == len(set(cells))
+    quick, slow = cells_of._members(key, 51), cells_of._members(key, 2**62)
+    for one, other in zip(quick, slow, strict=True):
+        assert np.array_equal(one, other)
+    assert len(quick[1]) == len(set(cells))
+
+
+@given(clouds, voxels)
+@settings(deadline=None)
+def test_lots_give_the_same_cells(points: np.ndarray, voxel: float) -> None:
+    whole = cells_of.voxel_cells(points, voxel)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(cells_of, "_LOT", 7)
+        patch.setattr(cells_of, "_KEPT", 20)
+        lots = cells_of.voxel_cells(points, voxel)
+    np.testing.assert_allclose(lots.centroids, whole.centroids, rtol=1e-12, atol=1e-9)
+    assert np.array_equal(lots.first, whole.first)
+
+
+def test_a_large_cloud_is_thinned_with_its_places(monkeypatch: pytest.MonkeyPatch) -> None:
+    rng = np.random.default_rng(0)
+    points = rng.uniform(-20, 20, (5000, 3)) * [1, 1, 0.1]
+    rows = (points[:, 0] > 0).astype(int)
+    many = np.concatenate([points, points + rng.normal(0, 1e-3, points.shape)])
+    source = PointCloud.of(
+        many, viewpoint=(np.array([[-10.0, 0, 0], [10, 0, 0]]), np.tile(rows, 2)), nonfinite="drop"
+    )
+    pair = Pair(source=source, target=PointCloud.of(points))
+    assert thinning.thinned(pair, 1.0) is pair
+    monkeypatch.setattr(thinning, "_MANY", 6000)
+    thin = thinning.thinned(pair, 0.4)
+    assert thin.target is pair.target
+    assert len(thin.source) <= 5300
+    places, of_point, _ = thin.source.seen
+    assert of_point is not None
+    clear = np.abs(thin.source.points[:, 0]) > 0.2
+    assert np.array_equal(places[of_point[clear], 0] > 0, thin.source.points[clear, 0] > 0)
+    scene = VoxelGrid(voxel=0.4)(pair)
+    assert any("10000 points were first thinned" in note for note in scene.notes)
+    kept = VoxelGrid(voxel=0.4)
+    monkeypatch.setattr(thinning, "_MANY", 10**9)
+    whole = kept(pair)
+    assert abs(len(scene.source) - len(whole.source)) <= 0.02 * len(whole.source)
+
+
+def test_matches_by_row_name_points_of_the_whole_cloud(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(thinning, "_MANY", 100)
+    pair, _ = sample_pair()
+    rows = np.column_stack([np.arange(len(pair.source))[-40:]] * 2) % len(pair.target)
+    trace = Pipeline(match="none", estimate="identity", refine="none").trace(pair, matches=rows)
+    assert np.array_equal(trace.matches.source, pair.source.points[rows[:, 0]])
 
 
 def test_millimetre_data_does_not_depend_on_the_last_digit() -> None:

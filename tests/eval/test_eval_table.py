@@ -155,7 +155,8 @@ def test_latex_is_escaped_and_balanced(ran: tuple[Table, Path]) -> None:
 
 def test_csv_holds_full_numbers(ran: tuple[Table, Path]) -> None:
     lines = list(csv.DictReader(io.StringIO(formats.table_csv(ran[0], RECIPE.protocols))))
-    assert [(line["method"], line["protocol"]) for line in lines] == [
+    assert [line["method"] for line in lines if line["not run"]] == ["odd"]
+    assert [(line["method"], line["protocol"]) for line in lines if not line["not run"]] == [
         (m, p) for p in ("cross3dreg", "kitti") for m in ("identity", "exact", "moody_<b>")
     ]
     assert float(lines[0]["rte_m_all"]) == ran[0].scores(CROSS)["identity"].rte_m_all

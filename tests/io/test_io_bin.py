@@ -39,14 +39,12 @@ def test_name_decides_where_the_values_fit_neither(name, columns):
 
 
 def test_values_that_fit_both_are_refused_with_the_reason():
-    with pytest.raises(
-        ValueError, match=r"320 bytes are 20 rows of four numbers or 16 of five, and both.*npy"
-    ):
+    with pytest.raises(ValueError, match=r"320 bytes are 20 rows of 4 or 16 rows of 5 numbers.*npy"):
         parse_bin(bytes(320), "a.bin")
 
 
 def test_cut_file_names_its_size():
-    with pytest.raises(ValueError, match=r"a\.bin: its 641 bytes are no multiple of 16.*nor of 20"):
+    with pytest.raises(ValueError, match=r"a\.bin: its 641 bytes are no multiple of 12, 16, 20"):
         parse_bin(rows(41, 4).tobytes()[:641], "a.bin")
 
 
@@ -56,10 +54,50 @@ def test_file_cut_to_a_size_of_the_other_layout_is_refused(width, cut):
         parse_bin(rows(60, width).tobytes()[:cut], "a.bin")
 
 
-def test_three_columns_are_refused():
-    table = rows(40, 4)[:, [0, 1, 2]]
-    with pytest.raises(ValueError, match=r"intensities are negative.*another layout"):
-        parse_bin(table.tobytes(), "a.bin")
+def columns(kind, points):
+    rng = np.random.default_rng(5)
+    n = len(points)
+    ring = (np.arange(n) % 32)[:, None]
+    more = {
+        "nothing": np.empty((n, 0)),
+        "intensity": rng.uniform(0, 1, (n, 1)),
+        "no intensity": np.zeros((n, 1)),
+        "intensity and ring": np.c_[rng.uniform(0, 255, n), ring],
+        "intensity, ring and time": np.c_[rng.uniform(0, 255, n), ring, np.linspace(0, 0.1, n)],
+        "colour": rng.integers(0, 256, (n, 3)),
+        "normal": points / np.linalg.norm(points, axis=1, keepdims=True),
+    }
+    return np.c_[points, more[kind]].astype("<f4")
+
+
+KINDS = [
+    "nothing",
+    "intensity",
+    "no intensity",
+    "intensity and ring",
+    "intensity, ring and time",
+    "colour",
+    "normal",
+]
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("n", [60, 180, 1020, 30_000, 30_011])
+@pytest.mark.parametrize("where", ["around the sensor", "all positive", "on a map"])
+def test_columns_tell_the_width(kind, n, where):
+    points = np.random.default_rng(n).normal(size=(n, 3)) * [5, 9, 1.5]
+    points += {"around the sensor": [0, 0, -1], "all positive": [25, 45, 9], "on a map": [4321, 987, 120]}[
+        where
+    ]
+    table = columns(kind, points)
+    np.testing.assert_array_equal(parse_bin(table.tobytes(), "a.bin"), table[:, :3])
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_cut_file_is_refused_at_every_width(kind):
+    table = columns(kind, np.random.default_rng(2).normal(size=(1000, 3)) * [5, 9, 1.5])
+    with pytest.raises(ValueError, match="no multiple"):
+        parse_bin(table.tobytes()[:-4], "a.bin")
 
 
 def test_float64_rows_are_refused():

@@ -1,7 +1,10 @@
 # SPDX-License-Identifier: MIT
 from __future__ import annotations
 
+import dataclasses
+import pickle
 import struct
+import zlib
 
 import cv2
 import numpy as np
@@ -11,6 +14,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 from hybridreg.io import as_image, read_image
+from hybridreg.io.image_size import image_size
 
 
 @pytest.fixture(scope="module")
@@ -175,3 +179,101 @@ def test_result_is_a_copy(rgb):
 def test_arrays_that_are_no_image(pixels, message):
     with pytest.raises(ValueError, match=rf"front camera: .*{message}"):
         as_image(pixels, "front camera")
+
+
+KINDS = [
+    ".png",
+    ".jpg",
+    ".bmp",
+    ".tiff",
+    ".webp",
+    ".ppm",
+    ".pgm",
+    ".pam",
+    ".ras",
+    ".hdr",
+    ".exr",
+    ".jp2",
+    ".gif",
+    ".avif",
+]
+
+
+@pytest.mark.parametrize("ending", KINDS)
+@pytest.mark.parametrize("shape", [(64, 96, 3), (77, 200, 3), (300, 65, 3)])
+def test_header_tells_the_size(ending, shape):
+    pixels = np.random.default_rng(0).integers(0, 256, size=shape, dtype=np.uint8)
+    pixels = pixels.astype(np.float32) / 255 if ending in (".hdr", ".exr") else pixels
+    try:
+        done, data = cv2.imencode(ending, pixels[..., 0] if ending == ".pgm" else pixels)
+    except cv2.error as error:
+        pytest.skip(f"this OpenCV writes no {ending}: {error}")
+    assert done
+    assert image_size(data.tobytes()) == shape[:2]
+
+
+@pytest.mark.parametrize("order", "<>")
+@pytest.mark.parametrize("kind, code", [(3, "H"), (4, "I")])
+def test_tiff_headers_of_both_orders(order, kind, code):
+    mark = b"II" if order == "<" else b"MM"
+    entry = struct.Struct(f"{order}HHI{code}{4 - struct.calcsize(code)}x")
+    head = mark + struct.pack(f"{order}HIH", 42, 8, 2)
+    assert image_size(head + entry.pack(257, kind, 1, 600) + entry.pack(256, kind, 1, 800)) == (600, 800)
+
+
+def bomb(rows, columns):
+    """A PNG that promises pixels, with the content of a small one."""
+    data = bytearray(encoded(np.zeros((4, 4, 3), np.uint8)))
+    data[16:24] = struct.pack(">II", columns, rows)
+    data[29:33] = struct.pack(">I", zlib.crc32(bytes(data[12:29])))
+    return bytes(data)
+
+
+def test_too_many_pixels_are_refused_before_they_are_decoded(read, monkeypatch):
+    monkeypatch.setattr("hybridreg.io.image._decode", lambda data: pytest.fail("was decoded"))
+    with pytest.raises(ValueError, match=r"30000 x 30000 pixels, 900 megapixels; make it smaller: 210"):
+        read(bomb(30000, 30000))
+    with pytest.raises(ValueError, match="megapixels"):
+        read(bomb(2**31 - 1, 2**31 - 1))
+
+
+def test_a_large_photograph_is_still_read(read):
+    assert read(encoded(np.zeros((5000, 4000), np.uint8))).shape == (5000, 4000, 3)
+
+
+@pytest.mark.parametrize("ending", KINDS)
+def test_any_cut_header_is_no_size_or_a_refusal(ending):
+    try:
+        data = cv2.imencode(
+            ending, np.zeros((64, 96, 3), np.float32 if ending in (".hdr", ".exr") else np.uint8)
+        )[1]
+    except cv2.error as error:
+        pytest.skip(f"this OpenCV writes no {ending}: {error}")
+    for end in range(0, min(len(data), 300)):
+        image_size(data.tobytes()[:end])
+
+
+def test_an_image_is_decoded_when_it_is_looked_at(tmp_path, rgb, monkeypatch):
+    from hybridreg import Pair
+    from hybridreg.io import image as module
+
+    path = tmp_path / "photo.png"
+    path.write_bytes(encoded(rgb))
+    decoded = []
+    decode = module._decode
+    monkeypatch.setattr(module, "_decode", lambda data: decoded.append(1) or decode(data))
+    points = np.random.default_rng(0).normal(size=(60, 3))
+    pair = Pair.of(points, points, path)
+    other = pickle.loads(pickle.dumps(pair.replaced(id="other")))
+    assert pair.has_image
+    assert other.has_image
+    assert not decoded
+    np.testing.assert_array_equal(pair.image, rgb)
+    np.testing.assert_array_equal(pair.image, rgb)
+    assert len(decoded) == 1
+    np.testing.assert_array_equal(other.image, rgb)
+    assert not dataclasses.replace(pair, image=None).has_image
+    assert Pair(source=pair.source, target=pair.target).image is None
+    path.write_bytes(bomb(30000, 30000))
+    with pytest.raises(ValueError, match="megapixels"):
+        Pair.of(points, points, path)

@@ -125,3 +125,31 @@ def test_real_cloud(real_data):
         points = read_points(path)
         with np.load(path) as archive:
             np.testing.assert_array_equal(points, archive["xyz"].astype(np.float64))
+
+
+@pytest.mark.parametrize("ending", ["asc", "pts", "xyzn", "xyzrgb", "xyzi", "tsv", "XYZ"])
+def test_text_under_every_ending(cloud, ending):
+    head = f"{len(cloud)}\n" if ending == "pts" else "// from CloudCompare\n" if ending == "asc" else ""
+    rows = "".join(f"{x!r} {y!r} {z!r} 0 0 1\n" for x, y, z in cloud.tolist())
+    np.testing.assert_array_equal(parse_points((head + rows).encode(), f"a.{ending}"), cloud)
+
+
+@pytest.mark.parametrize(
+    "name, data, cure",
+    [
+        ("a.bin", b"CCB2" + bytes(200), "CloudCompare's own format.*save it there as .ply or .las"),
+        ("a.e57", b"ASTM-E57" + bytes(200), "export it as .ply or .las"),
+        ("a.ply", b"ASTM-E57" + bytes(200), "an E57 file.*export it as"),
+        ("a.stl", b"solid", "sample its surface"),
+        ("a.obj", b"v 0 0 0", "sample its surface"),
+        ("a.parquet", b"PAR1", "pandas"),
+        ("a.csv", b"PAR1" + bytes(100), "Parquet"),
+        ("a.feather", b"ARROW1", "pandas"),
+        ("a.ptx", b"4", r"\.pts"),
+        ("a.pcap", b"\xd4\xc3\xb2\xa1", "sensor's own tool"),
+        ("a.mat", b"MATLAB 5.0", "save the array"),
+    ],
+)
+def test_files_of_other_tools_name_their_cure(name, data, cure):
+    with pytest.raises(ValueError, match=rf"{name}: .*{cure}"):
+        parse_points(data, name)

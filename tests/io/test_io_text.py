@@ -81,3 +81,65 @@ def test_refused_text(message):
 
 def test_names_without_rows_are_an_empty_cloud():
     assert parse_text(b"x,y,z\n", "a.csv").shape == (0, 3)
+
+
+UNITS = {
+    "X (mm)": "TIMESTAMP (ns), X (mm), Y (mm), Z (mm)\n1,1500,2000,3000\n2,-4000,5250,6e6\n3,7000,8000,-9000\n",
+    "x[cm]": "x[cm] y[cm] z[cm]\n150 200 300\n-400 525 6e5\n700 800 -900\n",
+    "x [cm], spaced": "x [cm] y [cm] z [cm]\n150 200 300\n-400 525 6e5\n700 800 -900\n",
+    "x_mm": "id;x_mm;y_mm;z_mm\n9;1500;2000;3000\n8;-4000;5250;6e6\n7;7000;8000;-9000\n",
+    "first returns": "RANGE1 (mm),X1 (mm),Y1 (mm),Z1 (mm)\n1,1500,2000,3000\n1,-4000,5250,6e6\n1,7000,8000,-9000\n",
+    "x/mm": "x/mm,y/mm,z/mm\n1500,2000,3000\n-4000,5250,6e6\n7000,8000,-9000\n",
+    "commented": "# scan 4\n# x(mm) y(mm) z(mm)\n1500 2000 3000\n-4000 5250 6e6\n7000 8000 -9000\n",
+    "unit: mm": "# unit: mm\n1500 2000 3000\n-4000 5250 6e6\n7000 8000 -9000\n",
+    "units are centimetres": "// Units are centimetres\n150 200 300\n-400 525 6e5\n700 800 -900\n",
+}
+
+
+@pytest.mark.parametrize("style", UNITS)
+def test_a_unit_in_the_header_is_believed_and_told(style):
+    with pytest.warns(UserWarning, match=r"a\.csv: its own header says that its unit is 0\.0"):
+        points = parse_text(UNITS[style].encode(), "a.csv")
+    np.testing.assert_allclose(points, THREE)
+
+
+@pytest.mark.parametrize("feet, metres", [("ft", 0.3048), ("feet", 0.3048), ("US survey feet", 1200 / 3937)])
+def test_feet(feet, metres):
+    with pytest.warns(UserWarning, match=r"0\.3048"):
+        points = parse_text(f"x ({feet}),y ({feet}),z ({feet})\n1,2,3\n4,5,6\n".encode(), "a.csv")
+    np.testing.assert_allclose(points, np.array([[1, 2, 3], [4, 5, 6]]) * metres)
+
+
+HEADS = {
+    "ParaView": "intensity,Points:0,Points:1,Points:2\n9,1.5,2,3\n9,-4,5.25,6e3\n9,7,8,-9\n",
+    "VeloView": "Points_m_XYZ:0,Points_m_XYZ:1,Points_m_XYZ:2,id\n1.5,2,3,1\n-4,5.25,6e3,1\n7,8,-9,1\n",
+    "Livox": "Version,X,Y,Z,Ori_x,Ori_y,Ori_z\n5,1.5,2,3,0,0,0\n5,-4,5.25,6e3,0,0,0\n5,7,8,-9,0,0,0\n",
+    "an index without a name": ",x,y,z\n0,1.5,2,3\n1,-4,5.25,6e3\n2,7,8,-9\n",
+    "normals too": "nx,ny,nz,x,y,z\n0,0,1,1.5,2,3\n0,0,1,-4,5.25,6e3\n0,0,1,7,8,-9\n",
+    "x_coord": "x_coord\ty_coord\tz_coord\n1.5\t2\t3\n-4\t5.25\t6e3\n7\t8\t-9\n",
+    "an unknown unit": "x (local),y (local),z (local)\n1.5,2,3\n-4,5.25,6e3\n7,8,-9\n",
+    "decimal commas, tabs": "X\tY\tZ\n1,5\t2\t3\n-4\t5,25\t6e3\n7\t8,0\t-9\n",
+    "decimal commas, spaces": "1,5 2,0 3\n-4,0 5,25 6e3\n7 8,0 -9,0\n",
+}
+
+
+@pytest.mark.parametrize("style", HEADS)
+def test_heads_of_tools(style):
+    np.testing.assert_array_equal(parse_text(HEADS[style].encode(), "a.csv"), THREE)
+
+
+REFUSED_HEADS = {
+    "in 'deg'": "x (deg),y (deg),z (m)\n1,2,3\n",
+    "differ: mm, mm, m": "x (mm),y (mm),z (m)\n1,2,3\n",
+    "longitudes and latitudes": "lon,lat,h\n7.1,50.7,100\n",
+    "several columns that may be": "pos_x,pos_y,pos_z,lidar_x,lidar_y,lidar_z\n1,2,3,4,5,6\n",
+    "grid of heights": "ncols 3\nnrows 2\nxllcorner 0\nyllcorner 0\ncellsize 1\n1 2 3\n4 5 6\n",
+    "counts the rows": "".join(f"{k} 1.5 2.5 {k * k}\n" for k in range(30)),
+}
+
+
+@pytest.mark.parametrize("message", REFUSED_HEADS)
+def test_refused_heads(message):
+    with pytest.raises(ValueError, match=r"a\.txt: ") as caught:
+        parse_text(REFUSED_HEADS[message].encode(), "a.txt")
+    assert message in str(caught.value)

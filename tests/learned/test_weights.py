@@ -52,6 +52,19 @@ def spoil(folder: Path, **changes: torch.Tensor | None) -> None:
         ({"in_proj.bias": None}, "in_proj.bias is missing"),
         ({"in_proj.bias": torch.zeros(3)}, r"in_proj.bias has shape \(3,\), not \(64,\)"),
         ({"in_proj.bias": torch.full((64,), torch.nan)}, "in_proj.bias holds values that are not finite"),
+        ({"in_proj.weight": torch.zeros(64, 256)}, "in_proj.weight holds zeros only"),
+        (
+            {"in_proj.bias": torch.zeros(64, dtype=torch.int64)},
+            "in_proj.bias is torch.int64; store it as float32",
+        ),
+        ({"in_proj.bias": torch.zeros(64, dtype=torch.uint8)}, "in_proj.bias is torch.uint8"),
+        ({"in_proj.bias": torch.zeros(64, dtype=torch.bool)}, "in_proj.bias is torch.bool"),
+        ({"in_proj.bias": torch.zeros(64).to(torch.float8_e4m3fn)}, "in_proj.bias is torch.float8_e4m3fn"),
+        ({"in_proj.bias": torch.zeros(64).to(torch.float8_e5m2)}, "in_proj.bias is torch.float8_e5m2"),
+        (
+            {"in_proj.bias": torch.full((64,), torch.inf).half()},
+            "in_proj.bias holds values that are not finite",
+        ),
         ({"surplus": torch.zeros(1)}, "surplus is not part of this network"),
         ({"in_proj.bias": None, "in_proj.weight": None}, "and 1 more"),
     ],
@@ -60,6 +73,21 @@ def test_a_wrong_tensor_is_named(folder: Path, changes: dict[str, torch.Tensor |
     spoil(folder, **changes)
     with pytest.raises(ValueError, match=message):
         from_pretrained(folder)
+
+
+@pytest.mark.parametrize("dtype", [torch.float64, torch.float16, torch.bfloat16])
+def test_other_floats_are_read(folder: Path, dtype: torch.dtype) -> None:
+    spoil(folder, **{"in_proj.bias": torch.zeros(64, dtype=dtype)})
+    assert from_pretrained(folder).state_dict()["in_proj.bias"].dtype == torch.float32
+
+
+@pytest.mark.parametrize("spoilt", [torch.zeros_like, lambda t: t * torch.nan, lambda t: t.to(torch.int32)])
+def test_a_spoilt_checkpoint_is_named(network: RegistrationNetwork, tmp_path: Path, spoilt) -> None:  # type: ignore[no-untyped-def]
+    state = {official_name(name): tensor for name, tensor in network.state_dict().items()}
+    name = official_name("in_proj.weight")
+    torch.save({"model": {**state, name: spoilt(state[name])}}, tmp_path / "a.pth.tar")
+    with pytest.raises(ValueError, match=r"in_proj\.weight (holds|is)"):
+        load_official(tmp_path / "a.pth.tar", network.config)
 
 
 def test_damaged_files_are_named(folder: Path) -> None:

@@ -1,0 +1,130 @@
+# SPDX-License-Identifier: MIT
+"""The points in a NumPy array of any layout that drivers and kits give it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hybridreg.io.faults import fault
+from hybridreg.io.names import axes_in
+from hybridreg.io.records import stack_axes
+
+Array = NDArray[np.float64]
+
+# Fields of one array that hold all three coordinates.
+TOGETHER = ("xyz", "points", "point", "positions", "position", "pos", "coords", "coord", "coordinates")
+# A cloud has at least 20 points, so that 3 to 6 rows of as many are channels: x, y, z, w (or intensity), ring, time.
+FEWEST, _MOST_CHANNELS = 20, 6
+# Sensors have eight rows and more; a stack of fewer images is more likely several clouds.
+_FEWEST_ROWS = 8
+# Of a raw LAS record: its X, Y and Z are whole numbers still to be scaled.
+_LAS_ONLY = ("bit_fields", "raw_classification", "point_source_id")
+
+
+def array_points(array: NDArray[Any], name: str, *, batched: bool = False) -> Array:
+    """x, y and z, shape (N, 3), a copy; what is masked becomes NaN.
+
+    Parameters
+    ----------
+    array : (N, 3+), (3 to 6, N), (H, W, 3+) or (3 to 6, H, W) numbers, or records with fields x, y, z (or xyz)
+        Of records any order, type, padding and number of dimensions; a unit in the name counts, as `X (mm)`.
+    name : str
+        What error messages call the cloud.
+    batched : bool
+        Whether a third dimension means several clouds (torch), not rows of one.
+
+    Raises
+    ------
+    ValueError
+        Another shape or type, naming both and the cure.
+    """
+    if array.dtype.names:
+        return _of_fields(array, name)
+    if array.dtype.kind not in "fiu":
+        raise fault(name, f"coordinates must be numbers, got dtype {_short(array)}", _as_numbers(array))
+    rows = _rows(array, name, batched)
+    if rows.shape[1] > 3 and counts_up(rows[:, 0]):
+        raise fault(
+            name, "its first column counts the rows, it is no coordinate", "leave it out: give columns 2 to 4"
+        )
+    return _numbers(rows[:, :3])
+
+
+def counts_up(column: NDArray[Any]) -> bool:
+    """Whether a column counts its rows: 20 of them or more, each one more than the last."""
+    return bool(len(column) >= FEWEST and column[1] - column[0] == 1 and np.all(np.diff(column) == 1))
+
+
+def _rows(array: NDArray[Any], name: str, batched: bool) -> NDArray[Any]:
+    shape = array.shape
+    if array.ndim == 2 and shape[0] in range(3, _MOST_CHANNELS + 1) and shape[1] >= FEWEST:
+        return array.T
+    if array.ndim == 3 and 3 <= shape[2] <= _MOST_CHANNELS and not (batched and shape[0] > 1):
+        if 1 < shape[0] < _FEWEST_ROWS:
+            cure = "pass one of them, x[0], or all as one cloud, x.reshape(-1, 3)"
+            raise fault(
+                name, f"expected an array of shape (N, 3), got {shape}: one cloud or {shape[0]}?", cure
+            )
+        return array.reshape(-1, shape[2])
+    if array.ndim == 3 and shape[0] in range(3, _MOST_CHANNELS + 1) and not batched:
+        return array.reshape(shape[0], -1).T
+    if array.ndim == 2 and shape[1] >= 3:
+        if shape[0] < FEWEST <= shape[1]:
+            cure = "if they are channels, transpose and choose: x[:3].T"
+            raise fault(name, f"expected an array of shape (N, 3), got {shape}, {shape[0]} points", cure)
+        return array
+    raise fault(name, f"expected an array of shape (N, 3), got {shape}", _shape_cure(array, batched))
+
+
+def _shape_cure(array: NDArray[Any], batched: bool) -> str:
+    if array.ndim == 3 and array.shape[2] >= 3 and batched:
+        return "give one cloud of the batch, x[0]"
+    if array.ndim == 1 and array.size and array.size % 3 == 0:
+        return "if it holds x, y, z of one point after another: x.reshape(-1, 3)"
+    if array.ndim == 2 and array.shape[1] == 2:
+        return "a pose in space needs three coordinates: numpy.column_stack([x, y, z])"
+    return "give one row a point: numpy.column_stack([x, y, z])"
+
+
+def _of_fields(array: NDArray[Any], name: str) -> Array:
+    names = array.dtype.names or ()
+    raw = [each for each in _LAS_ONLY if each in names]
+    if raw and "X" in names:
+        problem = f"is a raw LAS record (it has {raw[0]!r}), its X, Y and Z are not scaled"
+        raise fault(name, problem, "give what laspy.read returns, or its xyz")
+    lowered = [each.lower() for each in names]
+    together = next((lowered.index(each) for each in TOGETHER if each in lowered), None)
+    if together is not None and "x" not in lowered:
+        return array_points(array[names[together]].reshape(-1, *array.dtype[together].shape), name)
+    axes = axes_in(names, name)
+    columns = [np.ravel(array[names[column]]) for column in axes.columns]
+    if any(column.dtype.kind not in "fiu" or len(column) != array.size for column in columns):
+        raise fault(name, f"its x, y and z are {_short(array)}, not one number each", _as_numbers(columns[0]))
+    axes.tell(name)
+    points = stack_axes(*(_numbers(column) for column in columns))
+    return points if axes.metres == 1.0 else points * axes.metres
+
+
+def _numbers(values: NDArray[Any]) -> Array:
+    with np.errstate(over="ignore", invalid="ignore"):  # beyond float64 is infinite, and refused as such
+        numbers = np.array(np.ma.getdata(values), dtype=np.float64, order="C")
+    if np.ma.isMaskedArray(values):
+        numbers[np.ma.getmaskarray(values)] = np.nan  # a fill value is no coordinate
+    return numbers
+
+
+def _as_numbers(array: NDArray[Any]) -> str:
+    if array.dtype.kind == "c":
+        return "take the real part: x.real"
+    try:
+        np.ma.getdata(array).ravel()[:1000].astype(np.float64)
+    except (TypeError, ValueError):
+        return "give an array of numbers, one point a row: numpy.column_stack([x, y, z])"
+    return "convert with astype(float)"
+
+
+def _short(array: NDArray[Any]) -> str:
+    return str(array.dtype)[:120]

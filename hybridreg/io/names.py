@@ -1,0 +1,142 @@
+# SPDX-License-Identifier: MIT
+"""Which of several columns are x, y and z by their names, and in what unit."""
+
+from __future__ import annotations
+
+import re
+import warnings
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
+
+from hybridreg.io.faults import fault, shorten
+
+_AXES = ("x", "y", "z")
+# What tools put before or behind an axis: ROS, E57, ParaView, spreadsheets. Not `n` or `v`: normals and velocities.
+_AFFIXES = (
+    "point", "points", "pos", "position", "coord", "coords", "coordinate", "cartesian", "p", "xyz", "lidar", "velo",
+    "sensor", "loc", "location", "points_m_xyz", "first", "1",
+)  # fmt: skip
+_METRES = {
+    **dict.fromkeys(("m", "metre", "metres", "meter", "meters"), 1.0),
+    **dict.fromkeys(("mm", "millimetre", "millimetres", "millimeter", "millimeters"), 1e-3),
+    **dict.fromkeys(("cm", "centimetre", "centimetres", "centimeter", "centimeters"), 1e-2),
+    **dict.fromkeys(("dm", "decimetre", "decimetres", "decimeter", "decimeters"), 1e-1),
+    **dict.fromkeys(("km", "kilometre", "kilometres", "kilometer", "kilometers"), 1e3),
+    **dict.fromkeys(("ft", "foot", "feet"), 0.3048),
+    **dict.fromkeys(("ftus", "us-ft", "usft", "us survey foot", "us survey feet"), 1200 / 3937),
+    **dict.fromkeys(("in", "inch", "inches"), 0.0254),
+}
+_ANGLES = ("deg", "degree", "degrees", "°", "rad", "radian", "radians")
+_NAME = re.compile(r"(.*?)\s*(?:[\[(]([^\])]*)[\])]?|[/|]\s*([^/|]+)|[_ ](mm|cm|dm|m|km|ft))?")
+_SAID = re.compile(r"\bunits?\b\W*(?:is|are|in)?\W*([a-z-]+)", re.IGNORECASE)
+
+
+class Axes(NamedTuple):
+    """Where x, y and z stand, and the metres of one unit of theirs; 1 where the names tell no unit."""
+
+    columns: tuple[int, int, int]
+    metres: float = 1.0
+
+    def tell(self, name: str) -> None:
+        """Warn where the cloud called `name` is not in metres, since its pose will be."""
+        if self.metres != 1.0:
+            warnings.warn(
+                f"{name}: its own header says that its unit is {self.metres:.6g} m; it was read in metres, and the "
+                "pose is in metres too",
+                UserWarning,
+                stacklevel=3,
+            )
+
+
+def find_axes(names: Sequence[str], name: str) -> Axes | None:
+    """x, y and z among the columns of the cloud called `name`, upper or lower case; None where nothing names them.
+
+    A single column of each, or, if there is none, a single group that has x, y and z after (before) one common word,
+    such as `cartesianX`, `Points:0`, `x_coord`. A unit may follow: `X (mm)`, `x[cm]`, `y / ft`, `z_m`.
+
+    Raises
+    ------
+    ValueError
+        Several columns fit; one axis is in another unit than the others; an axis is an angle.
+    """
+    parsed = [_split(each) for each in names]
+    stems = [stem for stem, _ in parsed]
+    if any(axis in stems for axis in _AXES):
+        if any(stems.count(axis) != 1 for axis in _AXES):
+            return None
+        return _with_unit((stems.index("x"), stems.index("y"), stems.index("z")), parsed, name)
+    groups = list(dict.fromkeys(_groups(stems)))
+    if len(groups) > 1:
+        told = " and ".join(", ".join(str(names[column]) for column in group) for group in groups[:3])
+        raise fault(name, f"has several columns that may be x, y and z: {told}", "call one group x, y and z")
+    return _with_unit(groups[0], parsed, name) if groups else None
+
+
+def axes_in(names: Sequence[str], name: str) -> Axes:
+    """As `find_axes`, where there must be some.
+
+    Raises
+    ------
+    ValueError
+        As `find_axes`; no columns, or several of one name, are x, y and z.
+    """
+    found = find_axes(names, name)
+    if found is not None:
+        return found
+    stems = [_split(each)[0] for each in names]
+    held = shorten(", ".join(map(str, names)), 200)
+    if {"lon", "lat"} & {stem[:3] for stem in stems} and "x" not in stems:
+        problem = f"its columns {held} are longitudes and latitudes"
+        raise fault(name, problem, "project them to metres first, for example with pyproj to UTM")
+    axis = next(axis for axis in _AXES if stems.count(axis) != 1)
+    problem = f"has {stems.count(axis)} fields called {axis!r} among {held}"
+    raise fault(name, problem, "name the coordinates x, y and z, each once")
+
+
+def unit_said(text: str) -> float:
+    """Metres of the unit that a comment such as `unit: mm` names; 1 where it names none that is known."""
+    found = _SAID.search(text)
+    return _METRES.get(found.group(1).lower(), 1.0) if found else 1.0
+
+
+def _split(label: str) -> tuple[str, str]:
+    """Lower-case name without quotes, and its unit."""
+    match = _NAME.fullmatch(str(label).strip().strip("\"'").strip().lower())
+    if match is None:
+        return str(label).lower(), ""
+    stem, *units = match.groups()
+    return stem.strip(), next((unit.strip() for unit in units if unit), "")
+
+
+def _groups(stems: Sequence[str]) -> Iterator[tuple[int, int, int]]:
+    for stem in stems:
+        for end in ("x", "0"):
+            axes = _AXES if end == "x" else ("0", "1", "2")
+            for found in (
+                re.fullmatch(rf"(.+?)([_.: -]?){end}(1?)", stem),
+                re.fullmatch(r"(x)([_.: -]?)(.+)", stem),
+            ):
+                if found is None or (found.group(1) == "x" and end == "0"):
+                    continue
+                first, mark, last = found.groups()
+                word = last if first == "x" else first
+                if word not in _AFFIXES:
+                    continue
+                wanted = [
+                    f"{axis}{mark}{last}" if first == "x" else f"{first}{mark}{axis}{last}" for axis in axes
+                ]
+                if all(stems.count(each) == 1 for each in wanted):
+                    a, b, c = (stems.index(each) for each in wanted)
+                    yield a, b, c
+
+
+def _with_unit(columns: tuple[int, int, int], parsed: Sequence[tuple[str, str]], name: str) -> Axes:
+    units = [parsed[column][1] for column in columns]
+    angle = next((unit for unit in units if unit in _ANGLES), None)
+    if angle is not None:
+        raise fault(name, f"its x, y or z is in {angle!r}", "give Cartesian coordinates in metres")
+    metres = [_METRES.get(unit, 1.0) for unit in units]
+    if len(set(metres)) > 1:
+        told = ", ".join(unit or "none" for unit in units)
+        raise fault(name, f"the units of its x, y and z differ: {told}", "give all three in one unit")
+    return Axes(columns, metres[0])

@@ -1,0 +1,287 @@
+# SPDX-License-Identifier: MIT
+"""Objects as drivers, kits and tools hand them out: read right, or refused with a cure that works."""
+
+from __future__ import annotations
+
+from collections import namedtuple
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from hybridreg import PointCloud
+
+P = np.random.default_rng(0).normal(size=(60, 3)) * [5, 4, 2]
+F = P.astype("<f4").astype(np.float64)
+
+
+def same(x: Any, points: np.ndarray = P) -> None:
+    np.testing.assert_array_equal(PointCloud.of(x).points, points)
+
+
+def refused(x: Any) -> str:
+    with pytest.raises(ValueError, match=r"^target: ") as caught:
+        PointCloud.of(x, name="target")
+    return str(caught.value)
+
+
+def record(*fields: tuple[Any, ...], offsets: list[int] | None = None, size: int = 0) -> np.ndarray:
+    if offsets is None:
+        array = np.zeros(60, list(fields))
+    else:
+        names, formats = zip(*fields, strict=True)
+        array = np.zeros(60, {"names": names, "formats": formats, "offsets": offsets, "itemsize": size})
+    for axis, values in zip("xyz", P.T, strict=True):
+        for name in array.dtype.names or ():
+            if name.lower().split(" ")[0].split("_")[-1] == axis:
+                array[name] = values
+    return array
+
+
+def test_records_of_any_order_type_and_padding() -> None:
+    same(record(("z", "f8"), ("i", "u1"), ("y", ">f8"), ("x", "f8")))
+    same(
+        record(
+            ("x", "<f4"), ("y", "<f4"), ("z", "<f4"), ("intensity", "<f4"), offsets=[0, 4, 8, 16], size=32
+        ),
+        F,
+    )
+    same(record(("X", "f8"), ("Y", "f8"), ("Z", "f8")).view(np.recarray))
+    same(record(("pos_x", "f8"), ("pos_y", "f8"), ("pos_z", "f8"), ("nx", "f4"), ("ny", "f4"), ("nz", "f4")))
+    same(record(("x", "f8"), ("y", "f8"), ("z", "f8")).reshape(6, 10))
+    together = np.zeros(60, [("intensity", "f4"), ("xyz", "f8", 3)])
+    together["xyz"] = P
+    same(together)
+
+
+def test_records_in_another_unit_become_metres_and_say_so() -> None:
+    rows = record(("x (mm)", "f8"), ("y (mm)", "f8"), ("z (mm)", "f8"))
+    with pytest.warns(UserWarning, match=r"unit is 0\.001 m"):
+        cloud = PointCloud.of(rows)
+    np.testing.assert_allclose(cloud.points, P / 1000)
+
+
+def test_records_without_coordinates_name_what_they_hold() -> None:
+    assert "'nx, ny, nz'" in refused(np.zeros(60, [("nx", "f4"), ("ny", "f4"), ("nz", "f4")]))
+    assert "longitudes" in refused(np.zeros(60, [("lon", "f8"), ("lat", "f8"), ("height", "f8")]))
+    raw = np.zeros(60, [("X", "i4"), ("Y", "i4"), ("Z", "i4"), ("bit_fields", "u1")])
+    assert "laspy.read" in refused(raw)
+
+
+@pytest.mark.parametrize("fill", [1e3, 0.0, -9999.0])
+def test_fill_values_are_never_points(fill: float) -> None:
+    mask = np.zeros(P.shape, bool)
+    mask[::3, 1] = True
+    masked = np.ma.masked_array(np.where(mask, fill, P), mask)
+    assert "20 of 60 points" in refused(masked)
+    kept = PointCloud.of(masked, nonfinite="drop")
+    np.testing.assert_array_equal(kept.points, P[~mask.any(axis=1)])
+    whole = np.ma.masked_array((P * 100).astype(int), mask)
+    assert PointCloud.of(whole, nonfinite="drop").dropped == 20
+    rows = np.ma.masked_array(record(("x", "f8"), ("y", "f8"), ("z", "f8")), mask[:, 1])
+    assert PointCloud.of(rows, nonfinite="drop").dropped == 20
+
+
+def test_channels_first_organised_and_homogeneous() -> None:
+    same(P.T)
+    same(np.c_[P, np.ones(60)].T)
+    same(np.c_[P, np.ones(60)])
+    same(P.reshape(10, 6, 3))
+    same(np.moveaxis(P.reshape(2, 30, 3), -1, 0))
+    same(P[None])
+    same(tuple(P.T))
+    same(SimpleNamespace(points=np.c_[P, np.ones(60)].T))
+
+
+def test_several_clouds_are_not_one() -> None:
+    torch = pytest.importorskip("torch")
+    assert "x[0]" in refused(np.stack([P, P]))
+    assert "x[0]" in refused(torch.tensor(np.stack([P] * 16)))
+    same(torch.tensor(P)[None])
+
+
+def test_a_column_that_counts_is_no_coordinate() -> None:
+    assert "counts the rows" in refused(np.c_[np.arange(60), P])
+    assert "counts the rows" in refused(np.c_[np.arange(1, 61), P, P])
+
+
+def test_tensors() -> None:
+    torch = pytest.importorskip("torch")
+    same(torch.tensor(P, requires_grad=True))
+    same(torch.tensor(P).T)
+    same(torch.tensor(P).to_sparse())
+    same(torch.tensor(F).to(torch.bfloat16), torch.tensor(F).to(torch.bfloat16).double().numpy())
+    same(SimpleNamespace(pos=torch.tensor(P)))
+    same({"coord": torch.tensor(P), "feat": torch.zeros(60, 4)})
+
+
+def test_dictionaries_and_rows_with_names(tmp_path: Any) -> None:
+    x, y, z = P.T
+    same({"Z": z, "time": z, "x": x, "Y": y})
+    same({"cartesianX": x, "cartesianY": y, "cartesianZ": z})  # pye57
+    same({"point": P, "feat": z})  # Open3D-ML
+    np.savez(tmp_path / "a.npz", xyz=P)
+    same(np.load(tmp_path / "a.npz"))
+    same([{"z": c, "x": a, "y": b} for a, b, c in P.tolist()])
+    point = namedtuple("point", "intensity x y z")
+    same([point(9, *row) for row in P.tolist()])
+    same([SimpleNamespace(x=a, y=b, z=c, reflectivity=1) for a, b, c in P.tolist()])  # Livox, geometry_msgs
+    same(list(record(("z", "f8"), ("y", "f8"), ("x", "f8"))))
+    assert "lengths 60, 60, 59" in refused({"x": x, "y": y, "z": z[1:]})
+    assert "several columns" in refused(
+        {"pos_x": x, "pos_y": y, "pos_z": z, "point_x": x, "point_y": y, "point_z": z}
+    )
+
+
+def cloud2(order: str, rows: int) -> SimpleNamespace:
+    data = np.zeros(
+        60, {"names": ["y", "x", "z"], "formats": [f"{order}f4"] * 3, "offsets": [4, 0, 8], "itemsize": 20}
+    )
+    data["x"], data["y"], data["z"] = P.T
+    padded = [data[k::rows][: 60 // rows].tobytes() + bytes(12) for k in range(rows)]
+    fields = [
+        SimpleNamespace(name=n, offset=o, datatype=7, count=1) for n, o in (("x", 0), ("y", 4), ("z", 8))
+    ]
+    return SimpleNamespace(
+        fields=fields, point_step=20, row_step=20 * 60 // rows + 12, width=60 // rows, height=rows,
+        is_bigendian=order == ">", data=b"".join(padded),
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("order", "<>")
+@pytest.mark.parametrize("rows", [1, 4])
+def test_point_cloud_2(order: str, rows: int) -> None:
+    message = cloud2(order, rows)
+    expected = np.concatenate([F[k::rows] for k in range(rows)])
+    same(message, expected)
+    message.data = np.frombuffer(message.data, np.uint8)
+    same(message, expected)
+    message.data = message.data[:100]
+    assert "holds 100 bytes" in refused(message)
+
+
+def test_pandas() -> None:
+    pd = pytest.importorskip("pandas")
+    frame = pd.DataFrame({"t": range(60), "Z": P[:, 2], "x": P[:, 0], "y": P[:, 1]})
+    same(frame)
+    same(frame.set_index("t"))
+    same(frame.convert_dtypes())
+    same(frame.iloc[::-1], P[::-1])
+    same(pd.DataFrame(P))
+    same(frame.rename(columns={"Z": ("lidar", "z")}))
+    with pytest.warns(UserWarning, match="0.01 m"):
+        np.testing.assert_allclose(
+            PointCloud.of(frame.rename(columns={"x": "x[cm]", "y": "y[cm]", "Z": "z[cm]"})).points, P / 100
+        )
+    assert "'a, b, c'" in refused(pd.DataFrame(P, columns=list("abc")))
+    assert "2 fields called 'x'" in refused(pd.concat([frame, frame], axis=1))
+    lacking = frame.convert_dtypes()
+    lacking.loc[3, "x"] = pd.NA
+    assert PointCloud.of(lacking, nonfinite="drop").dropped == 1
+    assert "than numbers" in refused(frame.assign(x="far"))
+
+
+def test_polars_and_pyarrow() -> None:
+    columns = {"t": range(60), "Z": P[:, 2], "x": P[:, 0], "y": P[:, 1]}
+    pl = pytest.importorskip("polars")
+    same(pl.DataFrame(columns))
+    same(pl.DataFrame(P))
+    assert "collect()" in refused(pl.DataFrame(columns).lazy())
+    pa = pytest.importorskip("pyarrow")
+    same(pa.table({k: list(v) for k, v in columns.items()}))
+    same(pa.RecordBatch.from_pydict({k: list(v) for k, v in columns.items()}))
+    lacking = pa.table({"x": [None, *P[1:, 0]], "y": P[:, 1], "z": P[:, 2]})
+    assert PointCloud.of(lacking, nonfinite="drop").dropped == 1
+
+
+def test_xarray() -> None:
+    xr = pytest.importorskip("xarray")
+    same(xr.Dataset({axis: ("n", values) for axis, values in zip("xyz", P.T, strict=True)}))
+    same(xr.DataArray(P[:, ::-1], dims=("n", "axis"), coords={"axis": list("zyx")}))
+    same(xr.DataArray(P))
+
+
+def test_dask() -> None:
+    da = pytest.importorskip("dask.array")
+    same(da.from_array(P))
+
+
+def test_laspy() -> None:
+    laspy = pytest.importorskip("laspy")
+    las = laspy.LasData(laspy.LasHeader(point_format=3, version="1.2"))
+    las.header.scales = [1 / 512] * 3
+    grid = np.round(P * 512) / 512
+    las.x, las.y, las.z = grid.T
+    same(las, grid)
+    same(las.points, grid)
+    assert "laspy.read" in refused(las.points.array)
+
+
+def test_trimesh() -> None:
+    trimesh = pytest.importorskip("trimesh")
+    same(trimesh.PointCloud(P))
+    box = trimesh.creation.box()
+    assert "x.sample(100_000)" in refused(box)
+    assert "x.to_mesh().sample" in refused(trimesh.Scene(box))
+    assert len(PointCloud.of(box.sample(1000))) == 1000
+    assert len(PointCloud.of(trimesh.Scene(box).to_mesh().sample(1000))) == 1000
+    assert len(PointCloud.of(trimesh.creation.icosphere().vertices)) > 20
+
+
+def test_open3d() -> None:
+    from hybridreg._open3d import load_open3d
+
+    try:
+        o3d = load_open3d()
+    except ImportError as error:
+        pytest.skip(str(error))
+    for module in (o3d, o3d.t):
+        mesh = module.geometry.TriangleMesh.create_sphere()
+        assert "sample_points_uniformly(100_000)" in refused(mesh)
+        assert len(PointCloud.of(mesh.sample_points_uniformly(1000))) == 1000
+    assert len(PointCloud.of(mesh.vertex["positions"])) > 20
+    same(o3d.core.Tensor(P))
+    same(o3d.utility.Vector3dVector(P))
+    same(o3d.geometry.LineSet(o3d.utility.Vector3dVector(P), o3d.utility.Vector2iVector()))
+    assert "image" in refused(o3d.geometry.Image()).lower()
+
+
+def test_small_gicp_and_plyfile() -> None:
+    small_gicp = pytest.importorskip("small_gicp")
+    same(small_gicp.PointCloud(P))
+    plyfile = pytest.importorskip("plyfile")
+    element = plyfile.PlyElement.describe(record(("z", "f8"), ("y", "f8"), ("x", "f8")), "vertex")
+    same(element)
+    same(plyfile.PlyData([element]))
+
+
+@pytest.mark.parametrize(
+    "x, cure",
+    [
+        (P.astype(str), "astype(float)"),
+        (P.astype(object), "astype(float)"),
+        (P + 0j, "x.real"),
+        (np.full((60, 3), "far"), "column_stack"),
+        (P.ravel(), "reshape(-1, 3)"),
+        (P[:, :2], "three coordinates"),
+        (np.c_[P, P, P, P].T, "x[:3].T"),
+        (b"abc", "frombuffer"),
+        (zip(*P.T, strict=True), "column_stack"),
+        (object(), "column_stack"),
+        (lambda: P, "column_stack"),
+        ({"a": 1}, "name the coordinates"),
+        (SimpleNamespace(read=lambda: P), "read()"),
+        (memoryview(P.tobytes()), "reshape(-1, 3)"),
+    ],
+)
+def test_refusals_name_a_cure(x: Any, cure: str) -> None:
+    assert cure in refused(x)
+
+
+def test_cures_of_arrays_work() -> None:
+    same(P.astype(str).astype(float), P)
+    same((P + 0j).real)
+    same(P.ravel().reshape(-1, 3))
+    same(np.c_[P, P, P, P].T[:3].T)
+    same(memoryview(np.ascontiguousarray(P)))
