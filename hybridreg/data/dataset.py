@@ -28,8 +28,13 @@ class Dataset(Sequence[LabelledPair], ABC):
         """Read pair number `index`, 0 to len - 1."""
 
     def fingerprint(self) -> str:
-        """Changes when the pairs or their truths do."""
+        """Changes when the pairs or their truths do, by the content of their files."""
         return f"{zlib.crc32(repr(self.ids).encode()):08x}"
+
+    def looks(self) -> str:
+        """Stays as it is only where no file was touched, which is quicker to tell than a fingerprint; empty where
+        that cannot be told."""
+        return ""
 
     def pair_fingerprint(self, index: int) -> str:
         """Changes when pair number `index` does: under it, what was computed of the pair may be kept."""
@@ -74,6 +79,12 @@ def fingerprint_of(pairs: Sequence[LabelledPair]) -> str:
     """Fingerprint of any sequence: its own where it has one, else that of the names."""
     own = getattr(pairs, "fingerprint", None)
     return str(own()) if callable(own) else f"{zlib.crc32(repr(ids_of(pairs)).encode()):08x}"
+
+
+def looks_of(pairs: Sequence[LabelledPair]) -> str:
+    """How the files of any sequence look from outside: `Dataset.looks`; empty where it does not tell."""
+    own = getattr(pairs, "looks", None)
+    return str(own()) if callable(own) else ""
 
 
 def pair_fingerprints_of(pairs: Sequence[LabelledPair]) -> list[str]:
