@@ -21,6 +21,7 @@ from hybridreg.eval.store import Appender
 from hybridreg.eval.threads import one_thread
 from hybridreg.pair import LabelledPair
 from hybridreg.shipped_weights import CONFIG_FILE, WEIGHTS_FILE
+from hybridreg.workers import led, spread
 
 
 def predict(
@@ -169,12 +170,9 @@ def _parallel(
     seed: int,
     workers: int | None,
 ) -> Iterator[Row]:
-    from joblib import Parallel, delayed
-
     # One pair a task, so that a row is on the disk as soon as it is done.
-    run = Parallel(n_jobs=workers, return_as="generator_unordered", batch_size=1, pre_dispatch="2*n_jobs")
-    rows: Iterator[Row] = run(delayed(predict_pair)(method, pairs, i, ids[i], seed) for i in indices)
-    return rows
+    jobs = ((method, pairs, index, ids[index], seed) for index in indices)
+    return spread(predict_pair, jobs, workers, singly=True)
 
 
 def _one_by_one(
@@ -186,6 +184,8 @@ def _one_by_one(
     for index in indices:
         with ProcessPoolExecutor(max_workers=1) as pool:
             try:
-                yield pool.submit(predict_pair, method, pairs, index, ids[index], seed).result()
+                yield pool.submit(
+                    led, os.getpid(), predict_pair, (method, pairs, index, ids[index], seed)
+                ).result()
             except TerminatedWorkerError as error:
                 yield Row(index=index, id=ids[index], error=f"the process died: {one_line(error)}")

@@ -3,40 +3,80 @@
 
 from __future__ import annotations
 
+import errno
+import os
 import sys
 import warnings
 from collections.abc import Callable
+from contextlib import suppress
 from functools import wraps
 from typing import ParamSpec
 
 import typer
 
+from hybridreg.cli import stopping
+from hybridreg.cli.console import make_ready
+from hybridreg.cli.memory import lacks_memory, memory_sentence
+
 BAD_INPUT, VERDICT_FAILED = 2, 3
 
 P = ParamSpec("P")
 
+# What to do where a file cannot be written.
+_CURES = {
+    errno.ENOSPC: "make room, then run the same command again",
+    errno.EDQUOT: "make room, then run the same command again",
+    errno.EFBIG: "raise the limit of a file's size (ulimit -f), then run the same command again",
+    errno.EROFS: "name another folder",
+    errno.EACCES: "see to the rights, or name another folder",
+}
+
 
 def plainly(command: Callable[P, None]) -> Callable[P, None]:
-    """Make a command end with one sentence and exit code 2 where the input is at fault."""
+    """Make a command end with one sentence and exit code 2 where the input or the machine is at fault, and with 128 + n
+    where signal n stopped it."""
 
     @wraps(command)
     def wrapped(*args: P.args, **kwargs: P.kwargs) -> None:
-        with warnings.catch_warnings():
+        make_ready()
+        with warnings.catch_warnings(), stopping.stoppable():
             warnings.simplefilter("default", UserWarning)
             warnings.showwarning = _show_warning
             try:
                 command(*args, **kwargs)
-            except (ValueError, KeyError, OSError, ImportError) as error:
-                print(f"hybridreg: {sentence(error)}", file=sys.stderr)
+                _flush()
+            except BrokenPipeError:  # whoever read our output has seen enough
+                raise
+            except KeyboardInterrupt as error:
+                say(f"stopped by {stopping.name_of(error)}{stopping.how_of(error)}")
+                raise typer.Exit(128 + stopping.number_of(error)) from None
+            except Exception as error:
+                if lacks_memory(error):
+                    say(memory_sentence(error))
+                elif isinstance(error, (ValueError, KeyError, OSError, ImportError)):
+                    say(sentence(error))
+                else:
+                    raise
+                _silence_stdout()
                 raise typer.Exit(BAD_INPUT) from None
 
     return wrapped
 
 
-def sentence(error: Exception) -> str:
+def say(text: str) -> None:
+    """A line on stderr, where that can take one."""
+    with suppress(OSError):
+        print(f"hybridreg: {text}", file=sys.stderr, flush=True)
+
+
+def sentence(error: BaseException) -> str:
     """An exception's text on one line."""
     if isinstance(error, OSError) and error.strerror:
-        text = f"{error.filename}: {error.strerror}" if error.filename else error.strerror
+        text = f"{os.fspath(error.filename)}: {error.strerror}" if error.filename else error.strerror
+        cure = _CURES.get(error.errno or 0)
+        text += f"; {cure}" if cure else ""
+    elif isinstance(error, UnicodeError):  # whose first argument is an encoding
+        text = str(error)
     else:
         # str(KeyError) puts quotes around the sentence.
         text = str(error.args[0]) if error.args else type(error).__name__
@@ -44,4 +84,22 @@ def sentence(error: Exception) -> str:
 
 
 def _show_warning(message: Warning | str, *_: object, **__: object) -> None:
-    print(f"hybridreg: warning: {message}", file=sys.stderr)
+    say(f"warning: {message}")
+
+
+def _flush() -> None:
+    # Here, where a full disk behind it can still be told.
+    try:
+        sys.stdout.flush()
+    except OSError as error:
+        error.filename = "standard output"
+        raise
+
+
+def _silence_stdout() -> None:
+    # What could not be written is still in its buffer, and would be tried again at the end.
+    try:
+        sys.stdout.flush()
+    except OSError:
+        with suppress(OSError, ValueError):
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

@@ -87,10 +87,11 @@ def looks_of(pairs: Sequence[LabelledPair]) -> str:
     return str(own()) if callable(own) else ""
 
 
-def pair_fingerprints_of(pairs: Sequence[LabelledPair]) -> list[str]:
-    """Fingerprint of each pair of any sequence: its own where it has one, else the sequence's and its name."""
+def pair_fingerprints_of(pairs: Sequence[LabelledPair], n: int | None = None) -> list[str]:
+    """Fingerprint of each pair (the first ``n``) of any sequence: its own where it has one, else the sequence's and
+    its name."""
     own = getattr(pairs, "pair_fingerprint", None)
     if callable(own):
-        return [str(own(index)) for index in range(len(pairs))]
+        return [str(own(index)) for index in range(len(pairs) if n is None else n)]
     whole = fingerprint_of(pairs)
-    return [f"{whole}-{name}" for name in ids_of(pairs)]
+    return [f"{whole}-{name}" for name in ids_of(pairs)[:n]]
