@@ -16,7 +16,7 @@ import typer
 
 from hybridreg.cli import stopping
 from hybridreg.cli.console import make_ready
-from hybridreg.cli.memory import lacks_memory, memory_sentence
+from hybridreg.cli.memory import lacks_memory, memory_sentence, require_addresses
 
 BAD_INPUT, VERDICT_FAILED = 2, 3
 
@@ -41,23 +41,26 @@ def plainly(command: Callable[P, None]) -> Callable[P, None]:
         make_ready()
         with warnings.catch_warnings(), stopping.stoppable():
             warnings.simplefilter("default", UserWarning)
+            # Of workers that are ended early on purpose.
+            warnings.filterwarnings("ignore", message=".*tasks which were still being processed")
             warnings.showwarning = _show_warning
             try:
+                require_addresses()
                 command(*args, **kwargs)
-                _flush()
+                sys.stdout.flush()  # here, where a full disk behind it can still be told
             except BrokenPipeError:  # whoever read our output has seen enough
                 raise
             except KeyboardInterrupt as error:
                 say(f"stopped by {stopping.name_of(error)}{stopping.how_of(error)}")
                 raise typer.Exit(128 + stopping.number_of(error)) from None
             except Exception as error:
+                _give_up_stdout()
                 if lacks_memory(error):
                     say(memory_sentence(error))
                 elif isinstance(error, (ValueError, KeyError, OSError, ImportError)):
                     say(sentence(error))
                 else:
                     raise
-                _silence_stdout()
                 raise typer.Exit(BAD_INPUT) from None
 
     return wrapped
@@ -72,8 +75,10 @@ def say(text: str) -> None:
 def sentence(error: BaseException) -> str:
     """An exception's text on one line."""
     if isinstance(error, OSError) and error.strerror:
-        text = f"{os.fspath(error.filename)}: {error.strerror}" if error.filename else error.strerror
         cure = _CURES.get(error.errno or 0)
+        # Whatever writes a file of ours names it.
+        name = error.filename or ("standard output" if cure else "")
+        text = f"{name}: {error.strerror}" if name else error.strerror
         text += f"; {cure}" if cure else ""
     elif isinstance(error, UnicodeError):  # whose first argument is an encoding
         text = str(error)
@@ -87,17 +92,8 @@ def _show_warning(message: Warning | str, *_: object, **__: object) -> None:
     say(f"warning: {message}")
 
 
-def _flush() -> None:
-    # Here, where a full disk behind it can still be told.
-    try:
-        sys.stdout.flush()
-    except OSError as error:
-        error.filename = "standard output"
-        raise
-
-
-def _silence_stdout() -> None:
-    # What could not be written is still in its buffer, and would be tried again at the end.
+def _give_up_stdout() -> None:
+    # What could not be written may still be in its buffer, and would be tried again at the end.
     try:
         sys.stdout.flush()
     except OSError:

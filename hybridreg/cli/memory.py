@@ -5,6 +5,8 @@ from __future__ import annotations
 
 import errno
 
+_LEAST = 1600 * 2**20
+
 # What libraries say where Python says MemoryError: torch, C++, OpenCV, the loader of shared libraries, threads, BLAS.
 _SAID = (
     "not enough memory",
@@ -38,6 +40,19 @@ def memory_sentence(error: BaseException) -> str:
             f"{what}: this shell allows {limit / 2**20:.0f} MB of addresses; raise it (ulimit -v unlimited)"
         )
     return f"{what}; take a larger --voxel or fewer --workers, or thin the clouds first"
+
+
+def require_addresses() -> None:
+    """Refuse a limit under which the libraries cannot even be imported: some of them end the process, some never end.
+
+    Raises
+    ------
+    MemoryError
+        `ulimit -v` is below 1.6 GB.
+    """
+    limit = address_space()
+    if limit is not None and limit < _LEAST:
+        raise MemoryError("the libraries alone take 1.6 GB of addresses, training 3 GB")
 
 
 def address_space() -> int | None:
