@@ -44,7 +44,7 @@ def main() -> None:
                 root, "two", rounds=options.meetings, workers=workers, seed=options.seed
             )
             killed.same_tables(root, "whole", "two")
-            two_writers.overwrite_is_refused(root, "two", workers)
+            two_writers.overwrite_is_refused(root, "beside", workers)
         print(
             f"{workers} worker(s): {seconds:.1f} s undisturbed, {4 * options.pairs} rows; {story.kills} kills, "
             f"rows found at each start {story.began}; nothing lost, doubled or changed, same table",

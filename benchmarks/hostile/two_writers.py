@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Two batches begun at once into one folder, and killed at random moments: one of them writes, the other is told who."""
+"""Two batches begun at once into one folder, and killed at random moments: one writes, the other is told who."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ def run_two(root: Path, out: str, *, rounds: int, workers: int, seed: int) -> Me
 
 
 def overwrite_is_refused(root: Path, out: str, workers: int) -> None:
-    """``--overwrite`` beside a running batch is refused, and costs that one nothing.
+    """``--overwrite`` beside a running batch is refused, and costs that one nothing; `out` must not be there yet.
 
     Raises
     ------

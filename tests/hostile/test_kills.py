@@ -31,7 +31,7 @@ def test_two_writers_lose_nothing(batch: Path) -> None:
     met = two_writers.run_two(batch, "two", rounds=1, workers=1, seed=1)
     assert met.refused + met.finished >= 1
     killed.same_tables(batch, "whole", "two")
-    two_writers.overwrite_is_refused(batch, "two", 1)
+    two_writers.overwrite_is_refused(batch, "beside", 1)
 
 
 @pytest.mark.parametrize(
