@@ -43,8 +43,7 @@ def naming(path: str | os.PathLike[str], instead_of: str | os.PathLike[str] | No
     try:
         yield
     except OSError as error:
-        if error.filename is None or (
-            instead_of is not None and str(error.filename) == os.fspath(instead_of)
-        ):
+        ours = instead_of is not None and str(error.filename) == os.fspath(instead_of)
+        if ours or (error.filename is None and error.errno is not None):
             error.filename = os.fspath(path)
         raise
