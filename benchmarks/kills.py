@@ -2,7 +2,8 @@
 """SIGKILL during a batch at random moments: no finished pair is lost, doubled or changed, and the table is the same.
 
 A table of two methods on small made pairs is run once without disturbance, then killed again and again at seeded
-moments and begun anew, with one worker and with two.
+moments and begun anew, with one worker and with two. Then two at a time are begun into one folder: one is refused, and
+nothing is lost either.
 
     python -m benchmarks.kills --kills 20
 """
@@ -14,7 +15,7 @@ import os
 import tempfile
 from pathlib import Path
 
-from benchmarks.hostile import killed
+from benchmarks.hostile import killed, two_writers
 
 
 def main() -> None:
@@ -22,6 +23,7 @@ def main() -> None:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--kills", type=int, default=20)
+    parser.add_argument("--meetings", type=int, default=5, help="rounds of two writers")
     parser.add_argument("--pairs", type=int, default=20)
     parser.add_argument("--workers", type=int, nargs="*", default=[1, 2])
     parser.add_argument("--seed", type=int, default=0)
@@ -38,9 +40,19 @@ def main() -> None:
                 root, "killed", kills=options.kills, whole="whole", workers=workers, seed=options.seed
             )
             killed.same_tables(root, "whole", "killed")
+            met = two_writers.run_two(
+                root, "two", rounds=options.meetings, workers=workers, seed=options.seed
+            )
+            killed.same_tables(root, "whole", "two")
+            two_writers.overwrite_is_refused(root, "beside", workers)
         print(
             f"{workers} worker(s): {seconds:.1f} s undisturbed, {4 * options.pairs} rows; {story.kills} kills, "
             f"rows found at each start {story.began}; nothing lost, doubled or changed, same table",
+            flush=True,
+        )
+        print(
+            f"{workers} worker(s), two writers: {options.meetings} rounds, {met.refused} refused, {met.killed} killed, "
+            f"{met.finished} finished; nothing lost, doubled or changed, same table; --overwrite beside one refused",
             flush=True,
         )
 

@@ -5,18 +5,23 @@ from __future__ import annotations
 
 import dataclasses
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 from hybridreg import __version__
-from hybridreg.data.dataset import fingerprint_of, ids_of
+from hybridreg.data import content
+from hybridreg.data.dataset import fingerprint_of, ids_of, looks_of
 from hybridreg.eval import truth
 from hybridreg.eval.attempt import Method, attempt, one_line
 from hybridreg.eval.controls import Control
+from hybridreg.eval.header import fingerprint_under
 from hybridreg.eval.row import Row
 from hybridreg.eval.store import Appender
 from hybridreg.eval.threads import one_thread
 from hybridreg.pair import LabelledPair
+from hybridreg.shipped_weights import CONFIG_FILE, WEIGHTS_FILE
+from hybridreg.workers import led, spread
 
 
 def predict(
@@ -55,20 +60,31 @@ def predict(
     Raises
     ------
     ValueError
-        The file was made by another configuration or version; or two pairs share an id.
+        The file was made by another configuration or version, of data or weights whose content is another; it is being
+        written by another process; or two pairs share an id.
     ImportError
         A package that the method or the data need is not here; what was never run is no failed row.
+    OSError
+        The file cannot be written.
     """
     ids = ids_of(pairs)
+    seen = looks_of(pairs)
+    described = describe(method)
+    weights = weights_of(described)
     config = {
         "version": __version__,
-        "method": describe(method),
-        "data": {"name": data, "pairs": len(ids), "fingerprint": fingerprint_of(pairs)},
+        "method": described,
+        "data": {
+            "name": data,
+            "pairs": len(ids),
+            "fingerprint": fingerprint_under(path, seen) or fingerprint_of(pairs),
+        },
         "seed": seed,
+        **({"weights": weights} if weights else {}),
     }
     rows: dict[str, Row] = {}
-    with Appender(path, config, overwrite=overwrite) as file:
-        for row in file.done:
+    with Appender(path, config, ids=ids, overwrite=overwrite, seen=seen) as file:
+        for row in tuple(file.done):
             rows[row.id] = row
             if on_row is not None:
                 on_row(row)
@@ -93,6 +109,22 @@ def describe(method: Any) -> dict[str, Any]:
     )
     named = method if hasattr(method, "__qualname__") else type(method)
     return {"callable": f"{named.__module__}:{named.__qualname__}", **fields}
+
+
+def weights_of(described: Any) -> dict[str, str]:
+    """A hash of the weights of one's own that a method names, by their folder or file; those of the wheel are told by
+    the version."""
+    if not isinstance(described, Mapping):
+        return {}
+    found: dict[str, str] = {}
+    for key, value in described.items():
+        if key == "weights" and isinstance(value, str) and Path(value).exists():
+            folder = Path(value)
+            files = [folder / CONFIG_FILE, folder / WEIGHTS_FILE] if folder.is_dir() else [folder]
+            found[value] = " ".join(content.digest(file) for file in files if file.is_file())
+        for part in value if isinstance(value, (list, tuple)) else (value,):
+            found.update(weights_of(part))
+    return found
 
 
 def predict_pair(
@@ -142,12 +174,9 @@ def _parallel(
     seed: int,
     workers: int | None,
 ) -> Iterator[Row]:
-    from joblib import Parallel, delayed
-
     # One pair a task, so that a row is on the disk as soon as it is done.
-    run = Parallel(n_jobs=workers, return_as="generator_unordered", batch_size=1, pre_dispatch="2*n_jobs")
-    rows: Iterator[Row] = run(delayed(predict_pair)(method, pairs, i, ids[i], seed) for i in indices)
-    return rows
+    jobs = ((method, pairs, index, ids[index], seed) for index in indices)
+    return spread(predict_pair, jobs, workers, singly=True)
 
 
 def _one_by_one(
@@ -159,6 +188,8 @@ def _one_by_one(
     for index in indices:
         with ProcessPoolExecutor(max_workers=1) as pool:
             try:
-                yield pool.submit(predict_pair, method, pairs, index, ids[index], seed).result()
+                yield pool.submit(
+                    led, os.getpid(), predict_pair, (method, pairs, index, ids[index], seed)
+                ).result()
             except TerminatedWorkerError as error:
                 yield Row(index=index, id=ids[index], error=f"the process died: {one_line(error)}")

@@ -4,13 +4,14 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
 
 from hybridreg.data.dataset import ids_of
 from hybridreg.eval import errors, figures, formats, page
+from hybridreg.eval.attempt import one_line
 from hybridreg.eval.columns import Cells, number
 from hybridreg.eval.protocols import Protocol
 from hybridreg.eval.row import Row
@@ -29,7 +30,7 @@ def write(
     out: str | os.PathLike[str],
     pairs: Sequence[LabelledPair] | None = None,
 ) -> list[Path]:
-    """Write `table.md`, `table.tex`, `table.csv` and `report.html`, each whole or not at all.
+    """Write `table.md`, `table.tex`, `table.csv` and `report.html`, each whole or not at all, always as UTF-8.
 
     Parameters
     ----------
@@ -38,17 +39,30 @@ def write(
     Returns
     -------
     The files written.
+
+    Raises
+    ------
+    OSError
+        Files that could not be written: the first is named with its reason, and those that were written are there.
     """
     folder = Path(out)
     folder.mkdir(parents=True, exist_ok=True)
-    contents = {
-        "table.md": formats.markdown(table, protocols),
-        "table.tex": formats.latex(table, protocols),
-        "table.csv": formats.table_csv(table, protocols),
-        "report.html": html(table, protocols, pairs),
+    # The page is the largest, and the one that reads the data again.
+    contents: dict[str, Callable[[], str]] = {
+        "table.md": lambda: formats.markdown(table, protocols),
+        "table.tex": lambda: formats.latex(table, protocols),
+        "table.csv": lambda: formats.table_csv(table, protocols),
+        "report.html": lambda: html(table, protocols, pairs),
     }
-    for name, text in contents.items():
-        write_text(folder / name, text)
+    failed: list[OSError] = []
+    for name, make in contents.items():
+        text = make()
+        try:
+            write_text(folder / name, text)
+        except OSError as error:
+            failed.append(error)
+    if failed:
+        raise failed[0]
     return [folder / name for name in contents]
 
 
@@ -112,9 +126,13 @@ def _views(table: Table, protocol: Protocol, pairs: Sequence[LabelledPair] | Non
         if row.id not in ids or row.T_true is None:
             continue
         found = np.eye(4) if row.T is None else np.array(row.T)
-        pair = pairs[ids.index(row.id)].pair
         yield page.heading(f"{row.id}, {name}", 3)
         yield page.paragraph(_told(row))
+        try:
+            pair = pairs[ids.index(row.id)].pair
+        except (OSError, ValueError) as error:  # data that went bad since must not cost the report
+            yield page.paragraph(f"There is no view: {one_line(error)}")
+            continue
         yield figures.to_html(
             figures.clouds(pair.source.points, pair.target.points, found, np.array(row.T_true))
         )

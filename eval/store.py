@@ -5,16 +5,21 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Iterator, Mapping
+import warnings
+from collections.abc import Collection, Iterator, Mapping
+from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from hybridreg.eval.header import FORMAT, header_of, refuse_foreign, whole_lines
+from hybridreg.eval.lines import LineFile
 from hybridreg.eval.row import Row
-from hybridreg.io.structured import parse_json
-from hybridreg.plain_values import value_of
+from hybridreg.io.atomic import write_text
+from hybridreg.io.faults import naming
+from hybridreg.io.lock import file_lock
 
-_FORMAT = "hybridreg predictions 1"
+_CURE = "add --overwrite to make it anew, or choose another --out"
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,10 +50,10 @@ def read(path: str | os.PathLike[str]) -> Predictions:
         raise FileNotFoundError(
             f"{os.fspath(path)}: no file of predictions; run `hybridreg eval` to make one"
         )
-    lines, _ = _whole_lines(Path(path))
+    lines, _ = whole_lines(Path(path))
     if not lines:
         raise ValueError(f"{os.fspath(path)}: holds no predictions; run `hybridreg eval` to make some")
-    config = _header(lines[0], path)
+    config: dict[str, Any] = header_of(lines[0], path)["config"]
     rows: dict[str, Row] = {}
     for number, line in enumerate(lines[1:], start=2):
         try:
@@ -60,58 +65,110 @@ def read(path: str | os.PathLike[str]) -> Predictions:
 
 
 class Appender:
-    """Opens a file of predictions to add rows, each on the disk before the next is computed.
+    """Opens a file of predictions to add rows.
+
+    The file is locked until the block ends. Where somebody deletes it in the meantime it is made again, whole.
+
+    Parameters
+    ----------
+    ids : names of all pairs; with them a file that has all rows is neither locked nor touched
+    seen : what the data's files looked like (`hybridreg.data.dataset.looks_of`), kept beside the configuration
 
     Raises
     ------
+    InUse
+        Another process is writing it.
     ValueError
-        The file was made by another configuration; the message tells what differs.
+        The file was made by another configuration, or is damaged; the message tells what differs.
+    OSError
+        It cannot be written; the message names it.
     """
 
     def __init__(
-        self, path: str | os.PathLike[str], config: Mapping[str, Any], *, overwrite: bool = False
+        self,
+        path: str | os.PathLike[str],
+        config: Mapping[str, Any],
+        *,
+        ids: Collection[str] | None = None,
+        overwrite: bool = False,
+        seen: str = "",
     ) -> None:
-        self.path = Path(path)
-        self.path.parent.mkdir(parents=True, exist_ok=True)
-        if overwrite or not self._resumable(config):
-            self.done: list[Row] = []
-            self._file = self.path.open("w", encoding="utf-8")
-            self._write(json.dumps({"format": _FORMAT, "config": config}))
-        else:
-            self.done = read(self.path).rows
-            self._file = self.path.open("a", encoding="utf-8")
+        self.path, self._config = Path(path), config
+        self._header = json.dumps({"format": FORMAT, "config": config, **({"seen": seen} if seen else {})})
+        self._lock, self._held = file_lock(self.path), ExitStack()
+        self._file: LineFile | None = None
+        self.done = [] if overwrite else self._kept()
+        if ids is not None and not overwrite and {row.id for row in self.done}.issuperset(ids):
+            self._lock.sweep()
+            return
+        with naming(self.path):
+            self.path.parent.mkdir(parents=True, exist_ok=True)
+        with ExitStack() as stack:
+            stack.enter_context(self._lock)
+            # Read again: until now another process could have written.
+            self.done = [] if overwrite else self._kept()
+            self._file = self._opened(anew=overwrite)
+            self._held = stack.pop_all()
 
     def add(self, row: Row) -> None:
         """Append a row."""
-        self._write(row.to_json())
+        self._present().add(row.to_json())
+        self.done.append(row)
 
     def __enter__(self) -> Appender:
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._file.close()
+        with self._held:
+            if self._file is not None:
+                try:
+                    self._present()
+                finally:
+                    self._file.close()
 
-    def _write(self, line: str) -> None:
-        self._file.write(line + "\n")
-        self._file.flush()
-        os.fsync(self._file.fileno())
-
-    def _resumable(self, config: Mapping[str, Any]) -> bool:
+    def _kept(self) -> list[Row]:
+        # Rows of an earlier run under the same configuration.
         if not self.path.exists():
-            return False
-        lines, n_bytes = _whole_lines(self.path)
+            return []
+        lines, _ = whole_lines(self.path)
         if not lines:
-            _refuse_foreign(self.path)
-            return False
-        changed = list(differences(_header(lines[0], self.path), json.loads(json.dumps(config))))
+            refuse_foreign(self.path)
+            return []
+        changed = list(
+            differences(header_of(lines[0], self.path)["config"], json.loads(json.dumps(self._config)))
+        )
         if changed:
-            raise ValueError(
-                f"{self.path} was made by another configuration ({'; '.join(changed)}); "
-                "add --overwrite to make it anew, or choose another --out"
+            raise ValueError(f"{self.path} was made by another configuration ({'; '.join(changed)}); {_CURE}")
+        try:
+            return read(self.path).rows
+        except ValueError as error:
+            raise ValueError(f"{error}; {_CURE}") from error
+
+    def _opened(self, *, anew: bool) -> LineFile:
+        whole = whole_lines(self.path)[1] if self.path.exists() and not anew else 0
+        if whole:
+            # What follows the last whole line is half a row of a run that was cut off.
+            with naming(self.path):
+                os.truncate(self.path, whole)
+            return LineFile(self.path, anew=False)
+        file = LineFile(self.path, anew=True)
+        file.add(self._header)
+        return file
+
+    def _present(self) -> LineFile:
+        # The open file, made again where it was deleted.
+        assert self._file is not None
+        if not self._file.is_there():
+            self.path.parent.mkdir(parents=True, exist_ok=True)
+            self._lock.renew()
+            write_text(
+                self.path, "".join(f"{line}\n" for line in (self._header, *map(Row.to_json, self.done)))
             )
-        # What follows the last whole line is half a row of a run that was cut off.
-        os.truncate(self.path, n_bytes)
-        return True
+            self._file.close()
+            self._file = LineFile(self.path, anew=False)
+            told = f"{self.path} was deleted while it was being written; made again with its {len(self.done)} rows"
+            warnings.warn(told, UserWarning, stacklevel=4)
+        return self._file
 
 
 def differences(old: Any, new: Any, name: str = "") -> Iterator[str]:
@@ -125,32 +182,3 @@ def differences(old: Any, new: Any, name: str = "") -> Iterator[str]:
 
 def _short(value: Any) -> str:
     return "unset" if value is None else json.dumps(value)
-
-
-def _whole_lines(path: Path) -> tuple[list[str], int]:
-    data = path.read_bytes()
-    end = data.rfind(b"\n") + 1
-    try:
-        return data[:end].decode("utf-8").splitlines(), end
-    except UnicodeDecodeError as error:
-        raise ValueError(f"{path}: not a file of predictions ({error})") from error
-
-
-def _refuse_foreign(path: Path) -> None:
-    # A file without one whole line may be replaced only if it is the beginning of a header.
-    begun = path.read_bytes()
-    if not json.dumps({"format": _FORMAT}).encode().startswith(begun[:20]):
-        raise ValueError(f"{path}: not a file of predictions; choose another --out")
-
-
-def _header(line: str, path: str | os.PathLike[str]) -> dict[str, Any]:
-    try:
-        header = parse_json(line, os.fspath(path))
-    except ValueError:
-        header = None
-    if not isinstance(header, dict) or header.get("format") != _FORMAT:
-        raise ValueError(f"{os.fspath(path)}: not a file of predictions; its first line is not {_FORMAT!r}")
-    config: dict[str, Any] = value_of(
-        Mapping[str, Any], header.get("config"), f"{os.fspath(path)}, line 1: config"
-    )
-    return config

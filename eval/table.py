@@ -18,6 +18,7 @@ from hybridreg.eval.protocols import Protocol
 from hybridreg.eval.recipe import Recipe, slug
 from hybridreg.eval.row import Row
 from hybridreg.io import write_json
+from hybridreg.io.lock import folder_lock
 from hybridreg.io.structured import read_json
 from hybridreg.pair import LabelledPair
 from hybridreg.plain_values import build
@@ -136,8 +137,12 @@ def run(
 
     Raises
     ------
+    InUse
+        Another process is writing into `out`.
     ValueError
         No line can be run, or `out` holds predictions of another configuration.
+    OSError
+        `out` cannot be written to, or the disk is full; rows that are done are kept.
     """
     if all(line.method is None for line in recipe.lines):
         raise ValueError(
@@ -145,6 +150,19 @@ def run(
         )
     folder = Path(out)
     (folder / "predictions").mkdir(parents=True, exist_ok=True)
+    with folder_lock(folder):
+        return _run(recipe, pairs, folder, data, workers, overwrite, on_row)
+
+
+def _run(
+    recipe: Recipe,
+    pairs: Sequence[LabelledPair],
+    folder: Path,
+    data: str,
+    workers: int | None,
+    overwrite: bool,
+    on_row: Callable[[str, Row], None] | None,
+) -> Table:
     tried = YawStarts(pairs, recipe.starts, recipe.seed) if recipe.starts else pairs
     problems = {line.name: line.problem for line in recipe.lines if line.method is None}
     lines: list[str] = []

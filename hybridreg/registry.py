@@ -9,6 +9,7 @@ from importlib import import_module
 from importlib.metadata import entry_points
 from typing import Any
 
+from hybridreg import plugins
 from hybridreg.slots import SLOTS
 
 ENTRY_POINTS = "hybridreg.stages"
@@ -64,6 +65,8 @@ def load(slot: str, name: str) -> type[Any]:
     ------
     KeyError
         For a name that nobody registered; it lists the known ones.
+    ImportError
+        A plug-in that cannot be loaded, whatever its import raises.
     """
     if slot not in SLOTS:
         raise KeyError(f"no slot is called {slot!r}; the slots are {', '.join(SLOTS)}")
@@ -72,6 +75,8 @@ def load(slot: str, name: str) -> type[Any]:
         near = difflib.get_close_matches(name, names(slot), n=1)
         hint = f"; did you mean {near[0]!r}?" if near else ""
         raise KeyError(f"no {slot} stage is called {name!r}{hint} Known: {', '.join(names(slot))}")
+    if f"{slot}.{name}" not in BUILT_IN:
+        return plugins.load(target, f"{slot} stage {name!r}", ENTRY_POINTS)
     module, _, attribute = target.partition(":")
     cls: type[Any] = getattr(import_module(module), attribute)
     return cls

@@ -84,6 +84,26 @@ def test_eval_resumes_and_refuses_another_configuration(pairs: Path) -> None:
     assert call(*given, *PLAIN, "--seed", "1", "--overwrite").exit_code == 0
 
 
+def test_a_preset_that_changed_between_two_runs_is_refused(
+    pairs: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from hybridreg import presets
+
+    given = ["eval", "--data", pairs, "--preset", "icp", "--voxel", "0.5", "--out", "run"]
+    assert call(*given).exit_code == 0
+    icp = presets.load("icp")
+    monkeypatch.setattr(presets, "load", lambda _: {**icp, "refine": "none"})
+    refused = call(*given)
+    assert refused.exit_code == 2
+    assert 'method.refine.stage: "icp" before, "none" now' in refused.stderr
+    assert "add --overwrite" in refused.stderr
+    Path("mine.toml").write_text('match = "none"\nestimate = "identity"\nrefine = "none"\nvoxel = 0.5\n')
+    own = ["eval", "--data", pairs, "--pipeline", "mine.toml", "--out", "own"]
+    assert call(*own).exit_code == 0
+    Path("mine.toml").write_text('match = "none"\nestimate = "identity"\nrefine = "none"\nvoxel = 0.6\n')
+    assert "voxel" in call(*own).stderr
+
+
 def test_eval_takes_starts_and_workers(pairs: Path) -> None:
     result = call("eval", "--data", pairs, *PLAIN, "--starts", "1", "--workers", "2", "--out", "run")
     assert result.exit_code == 0, result.output

@@ -69,7 +69,7 @@ def write_data(folder: Path, pairs: int) -> None:
 def run_whole(root: Path, out: str, workers: int) -> float:
     """The batch without a kill; seconds."""
     start = time.perf_counter()
-    done = subprocess.run(_command(out, workers), cwd=root, capture_output=True, text=True, check=False)
+    done = subprocess.run(command(out, workers), cwd=root, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     return time.perf_counter() - start
 
@@ -99,13 +99,13 @@ def run_killed(root: Path, out: str, *, kills: int, whole: str, workers: int, se
         story.began.append(had)
         ahead = min(int(rng.integers(0, 2 * total // kills + 2)), total - had)
         process = subprocess.Popen(
-            _command(out, workers),
+            command(out, workers),
             cwd=root,
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
             start_new_session=True,
         )
-        _wait_for_rows(process, folder, had + ahead)
+        wait_for_rows(process, folder, had + ahead)
         story.kills += _killed_after(process, float(rng.uniform(0.0, 2.0 * row_seconds)))
         after = whole_lines(folder)
         compare(before, after)
@@ -124,7 +124,8 @@ def _count(lines: dict[str, list[bytes]]) -> int:
     return sum(len(each) - 1 for each in lines.values() if each)
 
 
-def _wait_for_rows(process: subprocess.Popen[bytes], folder: Path, rows: int) -> None:
+def wait_for_rows(process: subprocess.Popen[Any], folder: Path, rows: int) -> None:
+    """Return when the files hold so many rows, or the process has ended."""
     while process.poll() is None and _count(whole_lines(folder)) < rows:
         time.sleep(0.01)
 
@@ -164,7 +165,8 @@ def _figures(path: Path) -> list[dict[str, Any]]:
     return [{key: text for key, text in line.items() if not key.startswith(_UNSHARED)} for line in lines]
 
 
-def _command(out: str, workers: int) -> Sequence[str]:
+def command(out: str, workers: int) -> Sequence[str]:
+    """The batch as a command, to be run in its root."""
     options = ["--data", "data", "--out", out, "--workers", str(workers)]
     return [sys.executable, "-m", "hybridreg", "table", "table.toml", *options]
 

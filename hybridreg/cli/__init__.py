@@ -3,11 +3,21 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Sequence
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Run the command line; leaves by SystemExit: 0 done, 2 bad input, 3 the verdict is "failed"."""
-    from hybridreg.cli.app import app
-
+    """Run the command line; leaves by SystemExit: 0 done, 2 bad input, 3 the verdict is "failed", 128 + n stopped by
+    signal n."""
+    try:
+        from hybridreg.cli.app import app
+        from hybridreg.cli.console import make_ready
+    except (
+        ImportError,
+        MemoryError,
+        OSError,
+    ) as error:  # too little memory for the imports alone, or half an install
+        sys.exit(f"hybridreg: {' '.join(str(error).split()) or 'the memory is not enough'}")
+    make_ready()
     app(None if arguments is None else list(arguments))

@@ -11,6 +11,7 @@ import typer
 
 from hybridreg.cli import options
 from hybridreg.cli.faults import plainly
+from hybridreg.cli.stopping import going_on
 
 if TYPE_CHECKING:
     from hybridreg.data.summary import Array, Summary
@@ -49,7 +50,8 @@ def kitti_list(
     """Make KITTI's pairs anew: the field's walk, and ICP composed as T_icp @ M; takes seconds a pair."""
     from hybridreg.data import kitti_list as listing
 
-    print(f"written to {listing.write(root, split, workers)}")
+    with going_on(lambda: "nothing is written before the last pair: the same command begins anew"):
+        print(f"written to {listing.write(root, split, workers)}")
 
 
 def lines(found: Summary) -> Iterator[str]:

@@ -7,6 +7,9 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from hybridreg.cli.console import shown
+from hybridreg.cli.stopping import going_on
+
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
@@ -27,7 +30,12 @@ def run(recipe: Recipe, data: str, out: Path, *, workers: int, overwrite: bool) 
 
     pairs = open_dataset(data)
     n = len(pairs) * (recipe.starts + 1)
-    with Progress(console=Console(stderr=True), disable=not sys.stderr.isatty()) as progress:
+    anew = ", without --overwrite," if overwrite else ""
+    kept = f"finished rows are kept in {out}: the same command{anew} goes on from there"
+    with (
+        going_on(lambda: kept),
+        Progress(console=Console(stderr=True), disable=not sys.stderr.isatty()) as progress,
+    ):
         bars = {line.name: progress.add_task(line.name, total=n) for line in recipe.lines if line.method}
         done = table.run(
             recipe,
@@ -51,28 +59,38 @@ def with_starts(pairs: Sequence[LabelledPair], starts: int, seed: int) -> Sequen
 def write(
     done: Table, protocols: Sequence[Protocol], out: Path, pairs: Sequence[LabelledPair] | None
 ) -> None:
-    """Print the tables and write the reports."""
+    """Write the reports and print the tables; where one cannot be had, the other is."""
     from hybridreg.eval import formats, report
 
+    problem: OSError | None = None
+    try:
+        told = (
+            f"written to {out}: {', '.join(file.name for file in report.write(done, protocols, out, pairs))}"
+        )
+    except OSError as error:
+        problem = error
     for protocol in protocols:
         print_table(done.caption(protocol), formats.tables(done, protocol)["Results"])
     if done.paper is not None:
         print_table(done.paper.heading(), done.paper.cells())
     for remark in done.remarks():
         print(remark)
-    files = report.write(done, protocols, out, pairs)
-    print(f"written to {out}: {', '.join(file.name for file in files)}")
+    if problem is not None:
+        raise problem
+    print(told)
 
 
 def print_table(caption: str, lines: Sequence[Cells]) -> None:
     """Print a table as wide as its content, whatever the terminal."""
     from rich.console import Console
     from rich.table import Table as Grid
+    from rich.text import Text
 
-    grid = Grid(title=caption, title_justify="left")
+    # As text: a name in brackets is no style.
+    grid = Grid(title=Text(shown(caption)), title_justify="left")
     for key in lines[0]:
-        grid.add_column(key, justify="left" if key == "method" else "right", no_wrap=True)
+        grid.add_column(Text(shown(key)), justify="left" if key == "method" else "right", no_wrap=True)
     for line in lines:
-        grid.add_row(*line.values())
+        grid.add_row(*(Text(shown(cell)) for cell in line.values()))
     console = Console(width=None if sys.stdout.isatty() else 240)
     console.print(grid)

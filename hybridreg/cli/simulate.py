@@ -11,6 +11,7 @@ import typer
 
 from hybridreg.cli import options
 from hybridreg.cli.faults import plainly
+from hybridreg.cli.stopping import going_on
 
 
 @plainly
@@ -32,7 +33,10 @@ def command(
     from hybridreg.data.simulate.folder import write_pairs
 
     written = write_pairs(out, tier=tier, pairs=pairs, seed=seed, split=split, voxel=voxel, workers=workers)
-    with Progress(console=Console(stderr=True), disable=not sys.stderr.isatty()) as progress:
+    with (
+        going_on(lambda: f"finished pairs are kept in {out}: the same command goes on from there"),
+        Progress(console=Console(stderr=True), disable=not sys.stderr.isatty()) as progress,
+    ):
         folders = list(progress.track(written, total=pairs, description=f"{split}/{tier}"))
     size = sum(file.stat().st_size for folder in folders for file in folder.iterdir())
     print(f"written to {out}: {pairs} pairs, {size / 1e6 / pairs:.2f} MB each")

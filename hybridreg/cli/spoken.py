@@ -12,7 +12,6 @@ WORDS = (
     (r"call run\(pair, matches=\.\.\.\)", "which only Python can give: Pipeline.run(pair, matches=...)"),
     (r"choose a (smaller|larger) voxel\b", r"choose a \1 --voxel"),
     (r"a (smaller|larger) voxel or another unit", r"a \1 --voxel or another unit"),
-    (r"give a larger `voxel`", "give a larger one (--set estimate.voxel=...)"),
     (r"\bseed=(\S+) must be", r"--seed \1 must be"),
     (r"\bvoxel=(\S+) must be", r"--voxel \1 must be"),
     (r"\bvoxel=(\S+) was given", r"--voxel \1 was given"),

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import signal
 from pathlib import Path
 from typing import Annotated
 
@@ -10,6 +11,7 @@ import typer
 
 from hybridreg.cli import options
 from hybridreg.cli.faults import plainly
+from hybridreg.cli.stopping import Stopped, going_on
 
 
 @plainly
@@ -34,7 +36,9 @@ def command(
 ) -> None:
     """Train a network; stopped or killed, it goes on with --resume. Ends with weights and their card."""
     from hybridreg.learned.training import data_choice, recipe_file
+    from hybridreg.learned.training.loop import CHECKPOINT
     from hybridreg.learned.training.run import RunOptions, train
+    from hybridreg.learned.training.stopping import StopFlag
 
     wanted = recipe_file.read(recipe)
     if data:
@@ -45,8 +49,15 @@ def command(
     run = RunOptions(
         out=folder, cache=cache, resume=resume, devices=devices, accelerator=accelerator, workers=workers
     )
-    best = train(wanted, run)
-    if best is None:
-        print(f"stopped; go on with --resume --out {folder}")
-    else:
-        print(f"written to {best}: weights and card")
+    flag = StopFlag()
+
+    def how() -> str:
+        if (folder / CHECKPOINT).is_file():
+            return f"go on with --resume --out {folder}"
+        return f"prepared pairs are kept in {cache}: the same command goes on from there"
+
+    with going_on(how):
+        best = train(wanted, run, flag)
+        if best is None:  # other processes of the run hear of it from the first
+            raise Stopped(flag.number or signal.SIGTERM)
+    print(f"written to {best}: weights and card")

@@ -11,6 +11,7 @@ from importlib.metadata import entry_points
 from operator import attrgetter
 from pathlib import Path
 
+from hybridreg import plugins
 from hybridreg.pair import LabelledPair
 
 ENTRY_POINTS = "hybridreg.datasets"
@@ -54,6 +55,8 @@ def open_dataset(text: str | os.PathLike[str]) -> Sequence[LabelledPair]:
     ------
     FileNotFoundError
         Neither a folder nor a loader's name; or the loader misses its files and says where they must lie.
+    ImportError
+        A plug-in that cannot be loaded, whatever its import raises.
     """
     whole = os.fspath(text)
     name, colon, rest = whole.partition(":")
@@ -71,6 +74,9 @@ def open_dataset(text: str | os.PathLike[str]) -> Sequence[LabelledPair]:
 
 
 def _open(name: str, rest: str) -> Sequence[LabelledPair]:
+    if name not in BUILT_IN:
+        loaded: Sequence[LabelledPair] = plugins.load(known()[name], f"loader {name!r}", ENTRY_POINTS)(rest)
+        return loaded
     module, _, attribute = known()[name].partition(":")
     pairs: Sequence[LabelledPair] = attrgetter(attribute)(import_module(module))(rest)
     return pairs

@@ -28,8 +28,13 @@ class Dataset(Sequence[LabelledPair], ABC):
         """Read pair number `index`, 0 to len - 1."""
 
     def fingerprint(self) -> str:
-        """Changes when the pairs or their truths do."""
+        """Changes when the pairs or their truths do, by the content of their files."""
         return f"{zlib.crc32(repr(self.ids).encode()):08x}"
+
+    def looks(self) -> str:
+        """Stays as it is only where no file was touched, which is quicker to tell than a fingerprint; empty where
+        that cannot be told."""
+        return ""
 
     def pair_fingerprint(self, index: int) -> str:
         """Changes when pair number `index` does: under it, what was computed of the pair may be kept."""
@@ -76,10 +81,17 @@ def fingerprint_of(pairs: Sequence[LabelledPair]) -> str:
     return str(own()) if callable(own) else f"{zlib.crc32(repr(ids_of(pairs)).encode()):08x}"
 
 
-def pair_fingerprints_of(pairs: Sequence[LabelledPair]) -> list[str]:
-    """Fingerprint of each pair of any sequence: its own where it has one, else the sequence's and its name."""
+def looks_of(pairs: Sequence[LabelledPair]) -> str:
+    """How the files of any sequence look from outside: `Dataset.looks`; empty where it does not tell."""
+    own = getattr(pairs, "looks", None)
+    return str(own()) if callable(own) else ""
+
+
+def pair_fingerprints_of(pairs: Sequence[LabelledPair], n: int | None = None) -> list[str]:
+    """Fingerprint of each pair (the first ``n``) of any sequence: its own where it has one, else the sequence's and
+    its name."""
     own = getattr(pairs, "pair_fingerprint", None)
     if callable(own):
-        return [str(own(index)) for index in range(len(pairs))]
+        return [str(own(index)) for index in range(len(pairs) if n is None else n)]
     whole = fingerprint_of(pairs)
-    return [f"{whole}-{name}" for name in ids_of(pairs)]
+    return [f"{whole}-{name}" for name in ids_of(pairs)[:n]]

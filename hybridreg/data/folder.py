@@ -3,12 +3,13 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
-import zlib
 from pathlib import Path
 from typing import Any
 
 from hybridreg import se3
+from hybridreg.data import content
 from hybridreg.data.dataset import Dataset
 from hybridreg.io.structured import read_json
 from hybridreg.pair import LabelledPair, Pair
@@ -61,20 +62,18 @@ class PairFolder(Dataset):
         return load_pair(self.root / self.ids[index])
 
     def fingerprint(self) -> str:
-        digest = 0
-        for name in self.ids:
-            digest = self._digest(name, digest)
-        return f"{digest:08x}"
+        digests = [self.pair_fingerprint(index) for index in range(len(self))]
+        return hashlib.blake2b(repr(digests).encode(), digest_size=8).hexdigest()
+
+    def looks(self) -> str:
+        return content.looks_of_all(file for name in self.ids for file in _files(self.root / name).values())
 
     def pair_fingerprint(self, index: int) -> str:
-        """Of the pair's own files, so that a folder that grows keeps what was computed of its pairs."""
+        """Of the content of the pair's own files, so that a folder that grows keeps what was computed of its pairs."""
         name = self.ids[index]
-        return f"{self._digest(name, 0):08x}-{name}"
-
-    def _digest(self, name: str, before: int) -> int:
-        files = _files(self.root / name)
-        sizes = {kind: file.stat().st_size for kind, file in files.items()}
-        return zlib.crc32(repr((name, sorted(sizes.items()))).encode() + files["meta"].read_bytes(), before)
+        digests = {kind: content.digest(file) for kind, file in _files(self.root / name).items()}
+        total = hashlib.blake2b(repr((name, sorted(digests.items()))).encode(), digest_size=8)
+        return f"{total.hexdigest()}-{name}"
 
 
 def load_pair(folder: Path) -> LabelledPair:

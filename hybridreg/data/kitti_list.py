@@ -20,6 +20,7 @@ from hybridreg.data.trajectories import rigid
 from hybridreg.data.walking import kitti_pairs
 from hybridreg.io import write_json
 from hybridreg.pair import Pair
+from hybridreg.workers import spread
 
 Array = NDArray[np.float64]
 
@@ -90,15 +91,13 @@ def write(root: Path, split: str = "test", workers: int = 1) -> Path:
     ValueError
         An unknown split, or no pairs.
     """
-    from joblib import Parallel, delayed
-
     if split not in SPLITS:
         raise ValueError(f"split={split!r} must be one of {', '.join(SPLITS)}")
     base = base_of(root)
-    jobs = [delayed(refined)(Drive(base, n), source, target) for n, source, target in walk(base, split)]
+    jobs = [(Drive(base, n), source, target) for n, source, target in walk(base, split)]
     if not jobs:
         raise ValueError(f"{base}: no two scans of {split} lie 10 m apart")
-    pairs = [asdict(each) for each in Parallel(n_jobs=workers)(jobs)]
+    pairs = [asdict(each) for each in spread(refined, jobs, workers, ordered=True)]
     file = place(base, split)
     file.parent.mkdir(exist_ok=True)
     write_json(file, {"split": split, "composition": COMPOSITION, "pairs": pairs})

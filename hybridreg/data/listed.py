@@ -3,12 +3,15 @@
 
 from __future__ import annotations
 
+import hashlib
 import inspect
 from collections import Counter
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from hybridreg.data import spelling
+import numpy as np
+
+from hybridreg.data import content, spelling
 from hybridreg.data.dataset import Dataset
 from hybridreg.data.pair_files import PairFiles, PairTable
 from hybridreg.data.places import refuse_missing
@@ -88,7 +91,20 @@ class ListedPairs(Dataset):
         direction.check(self, str(self.origin), self.if_inverted)
 
     def fingerprint(self) -> str:
-        return f"{self.entries.digest():08x}"
+        total = hashlib.blake2b(f"{self.entries.digest():08x}".encode(), digest_size=8)
+        for index in range(len(self)):
+            total.update(" ".join(content.digest(file) for file in self.entries.paths(index)).encode())
+        return total.hexdigest()
+
+    def looks(self) -> str:
+        return content.looks_of_all(f for index in range(len(self)) for f in self.entries.paths(index))
+
+    def pair_fingerprint(self, index: int) -> str:
+        """Of the content of the pair's own files and its pose."""
+        entry = self.entries[index]
+        total = hashlib.blake2b(np.round(entry.T_target_source, 9).tobytes(), digest_size=8)
+        total.update(" ".join(content.digest(file) for file in self.entries.paths(index)).encode())
+        return f"{total.hexdigest()}-{entry.id}"
 
 
 def _refuse_doubles(ids: tuple[str, ...], origin: Path) -> None:

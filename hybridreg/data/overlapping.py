@@ -21,7 +21,8 @@ def overlapping(
     """Pairs whose overlap is at least `least`, with it.
 
     All overlaps are measured the first time, which reads every cloud, and written to
-    `root/hybridreg-overlaps-<key>.json`; the key changes with the pairs, their poses and the radius.
+    `root/hybridreg-overlaps-<key>.json`; the key changes with the pairs, their poses, the radius, and the size and
+    time of every cloud.
 
     Warns
     -----
@@ -41,13 +42,14 @@ def overlapping(
 def _key(entries: Sequence[PairFiles], radius: float) -> str:
     digest = zlib.crc32(repr(radius).encode())
     for entry in entries:
-        sizes = f"{entry.id} {_size(entry.source)} {_size(entry.target)}"
-        digest = zlib.crc32(sizes.encode() + np.round(entry.T_target_source, 9).tobytes(), digest)
+        looks = f"{entry.id} {_looks(entry.source)} {_looks(entry.target)}"
+        digest = zlib.crc32(looks.encode() + np.round(entry.T_target_source, 9).tobytes(), digest)
     return f"{digest:08x}"
 
 
-def _size(file: Path) -> int:
-    return file.stat().st_size
+def _looks(file: Path) -> tuple[int, int]:
+    stat = file.stat()
+    return stat.st_size, stat.st_mtime_ns
 
 
 def _kept(file: Path, entries: Sequence[PairFiles]) -> dict[str, float] | None:

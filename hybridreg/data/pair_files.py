@@ -85,6 +85,10 @@ class PairTable(Sequence[PairFiles]):
         """Changes when the names of the pairs or their poses do, not with the place of the files."""
         return zlib.crc32(repr(self.ids).encode(), zlib.crc32(np.round(self._T, 9).tobytes()))
 
+    def paths(self, index: int) -> list[str]:
+        """Files of pair `index`."""
+        return [file for file in self._files[index] if file is not None]
+
     @overload
     def __getitem__(self, index: int) -> PairFiles: ...
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from hybridreg import se3
 from hybridreg.cloud import PointCloud
-from hybridreg.data.dataset import Dataset, fingerprint_of, ids_of
+from hybridreg.data.dataset import Dataset, fingerprint_of, ids_of, looks_of
 from hybridreg.pair import LabelledPair
 
 
@@ -42,6 +42,9 @@ class YawStarts(Dataset):
 
     def fingerprint(self) -> str:
         return f"{fingerprint_of(self.pairs)}-yaw{self.n}-{self.seed}"
+
+    def looks(self) -> str:
+        return looks_of(self.pairs)
 
 
 def yaw_starts(pairs: Sequence[LabelledPair], n: int = 3, seed: int = 0) -> YawStarts:

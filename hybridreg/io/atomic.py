@@ -10,6 +10,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from hybridreg.io.faults import naming
+
 
 @contextmanager
 def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
@@ -37,19 +39,23 @@ def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
         `path` is a folder.
     ValueError
         `path` is a device or a pipe, which a rename would destroy.
+    OSError
+        A full disk, a folder that cannot be written to; it names `path`.
     """
     target = _writable_target(path)
-    temporary = _fresh_file(target)
-    try:
-        yield temporary
-        if target.exists():
-            shutil.copymode(target, temporary)
-        _flush_to_disk(temporary)
-        os.replace(temporary, target)
-    except BaseException:
-        temporary.unlink(missing_ok=True)
-        raise
-    _flush_folder(target.parent)
+    temporary = target.with_name(f".{secrets.token_hex(8)}{target.suffix}")
+    with naming(path, instead_of=temporary):
+        _make(temporary)
+        try:
+            yield temporary
+            if target.exists():
+                shutil.copymode(target, temporary)
+            _flush_to_disk(temporary)
+            os.replace(temporary, target)
+        except BaseException:
+            temporary.unlink(missing_ok=True)
+            raise
+        _flush_folder(target.parent)
 
 
 def write_bytes(path: str | os.PathLike[str], data: bytes) -> None:
@@ -59,8 +65,11 @@ def write_bytes(path: str | os.PathLike[str], data: bytes) -> None:
 
 
 def write_text(path: str | os.PathLike[str], text: str) -> None:
-    """Write `text` to `path` as UTF-8 with newlines as given, whole or not at all (see `atomic_path`)."""
-    write_bytes(path, text.encode("utf-8"))
+    """Write `text` to `path` as UTF-8 with newlines as given, whole or not at all (see `atomic_path`).
+
+    Bytes of a file's name that are no UTF-8 come as lone surrogates, and are written as ``\\udcff``.
+    """
+    write_bytes(path, text.encode("utf-8", "backslashreplace"))
 
 
 def _writable_target(path: str | os.PathLike[str]) -> Path:
@@ -74,11 +83,9 @@ def _writable_target(path: str | os.PathLike[str]) -> Path:
     return target
 
 
-def _fresh_file(target: Path) -> Path:
+def _make(temporary: Path) -> None:
     # Not tempfile: its files are readable by their owner alone, whatever the umask says.
-    temporary = target.with_name(f".{secrets.token_hex(8)}{target.suffix}")
     os.close(os.open(temporary, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666))
-    return temporary
 
 
 def _flush_to_disk(path: Path) -> None:

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 
@@ -34,3 +35,15 @@ def foreign_parser(name: str, kind: str) -> Iterator[None]:
     except BaseException as error:
         reason = shorten(str(error) or type(error).__name__, 200)
         raise fault(name, f"cannot be read as {kind} ({reason})") from error
+
+
+@contextmanager
+def naming(path: str | os.PathLike[str], instead_of: str | os.PathLike[str] | None = None) -> Iterator[None]:
+    """Have an `OSError` of the block name `path` where it names nothing (a full disk), or a file of our own making."""
+    try:
+        yield
+    except OSError as error:
+        ours = instead_of is not None and str(error.filename) == os.fspath(instead_of)
+        if ours or (error.filename is None and error.errno is not None):
+            error.filename = os.fspath(path)
+        raise

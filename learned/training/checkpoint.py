@@ -3,7 +3,9 @@
 
 from __future__ import annotations
 
+import io
 import os
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
@@ -11,7 +13,7 @@ from typing import Any
 import torch
 
 from hybridreg import __version__
-from hybridreg.io.atomic import atomic_path
+from hybridreg.io.atomic import write_bytes
 from hybridreg.io.files import read_whole
 from hybridreg.io.torch_file import parse_torch
 
@@ -39,8 +41,15 @@ def save(
     network: torch.nn.Module,
     optimizer: torch.optim.Optimizer | None,
     recipe: dict[str, Any],
+    data: Mapping[str, str] | None = None,
 ) -> None:
-    """Write a checkpoint, whole or not at all."""
+    """Write a checkpoint, whole or not at all; `data` tells the content of each source, so that a change is noticed.
+
+    Raises
+    ------
+    OSError
+        A full disk, a folder that cannot be written to; it names `path`.
+    """
     content = {
         "format": _FORMAT,
         "version": __version__,
@@ -48,9 +57,12 @@ def save(
         "progress": asdict(progress),
         "network": network.state_dict(),
         "optimizer": None if optimizer is None else optimizer.state_dict(),
+        "data": dict(data or {}),
     }
-    with atomic_path(path) as temporary:
-        torch.save(content, temporary)
+    # By way of memory: on a full disk torch's own writer tells neither the reason nor the file.
+    stored = io.BytesIO()
+    torch.save(content, stored)
+    write_bytes(path, stored.getvalue())
 
 
 def load(path: str | os.PathLike[str]) -> dict[str, Any]:

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import csv
+import errno
 import io
 import os
 from collections.abc import Mapping, Sequence
@@ -11,6 +12,7 @@ from pathlib import Path
 
 from hybridreg.io.atomic import write_text
 from hybridreg.io.cells import cell
+from hybridreg.io.faults import naming
 
 Value = str | int | float
 
@@ -29,12 +31,23 @@ class CurveFile:
             self.append(row)
 
     def append(self, row: Mapping[str, Value]) -> None:
-        """Add a line in one write; columns that are not given stay empty."""
-        handle = os.open(self.path, os.O_WRONLY | os.O_APPEND)
-        try:
-            os.write(handle, self._text(row).encode())
-        finally:
-            os.close(handle)
+        """Add a line, whole or not at all; columns that are not given stay empty.
+
+        Raises
+        ------
+        OSError
+            A full disk; it names the file.
+        """
+        line = self._text(row).encode()
+        with naming(self.path):
+            handle = os.open(self.path, os.O_WRONLY | os.O_APPEND)
+            try:
+                before = os.fstat(handle).st_size
+                if os.write(handle, line) < len(line):
+                    os.ftruncate(handle, before)
+                    raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+            finally:
+                os.close(handle)
 
     def rows(self) -> list[dict[str, str]]:
         """All lines; none where there is no file."""

@@ -183,7 +183,12 @@ class Loop:
         if self.fabric.is_global_zero:
             self.record.keep_time()
             checkpoint.save(
-                self.out / CHECKPOINT, self.progress, self.network, optimizer, self.recipe.to_dict()
+                self.out / CHECKPOINT,
+                self.progress,
+                self.network,
+                optimizer,
+                self.recipe.to_dict(),
+                {source.title: source.content for source in self.sources},
             )
         self._saved = time.monotonic()
         self.fabric.barrier()

@@ -7,6 +7,7 @@ import logging
 from collections.abc import Callable, Iterator
 
 from hybridreg.learned.training.pair_source import PairSource
+from hybridreg.workers import spread
 
 _log = logging.getLogger(__name__)
 
@@ -38,10 +39,7 @@ def prepare_all(source: PairSource, workers: int, on_pair: Callable[[], None] = 
 
 
 def _run(source: PairSource, missing: list[int], workers: int) -> Iterator[tuple[int, str | None]]:
-    from joblib import Parallel, delayed
-
-    run = Parallel(n_jobs=workers, return_as="generator_unordered")
-    yield from run(delayed(_prepare)(source, index) for index in missing)
+    yield from spread(_prepare, ((source, index) for index in missing), workers)
 
 
 def _prepare(source: PairSource, index: int) -> tuple[int, str | None]:

@@ -84,7 +84,12 @@ class Reporter:
             return
         for name, value in row.items():
             if isinstance(value, float) and _told(value):
-                self.board.add_scalar(f"{group}/{name}", value, row["total"])
+                try:
+                    self.board.add_scalar(f"{group}/{name}", value, row["total"])
+                except OSError as error:  # a full disk: the curves are an extra
+                    self.console.print(f"TensorBoard's curves end here: {error}", highlight=False)
+                    self.board = None
+                    return
 
 
 def _told(value: Any) -> bool:

@@ -3,8 +3,11 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Mapping
 from typing import Any
+
+_log = logging.getLogger(__name__)
 
 _SHAPING = ("network", "seed", "start", "augmentation", "infonce", "clip", "precision")
 
@@ -25,4 +28,13 @@ def check_same(now: Mapping[str, Any], then: Mapping[str, Any], phase: int) -> N
         raise ValueError(
             f"the checkpoint comes from a recipe with another {', '.join(different)}; resume with its own recipe, "
             "or begin in another folder"
+        )
+
+
+def tell_changed_data(then: Mapping[str, str], now: Mapping[str, str]) -> None:
+    """Log the sources whose pairs have another content than when the checkpoint was written; they count as they are
+    now."""
+    for title in sorted(name for name in now if then.get(name) and now[name] and then[name] != now[name]):
+        _log.warning(
+            "the data of %s has changed since the checkpoint; changed pairs are prepared again", title
         )

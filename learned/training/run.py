@@ -3,14 +3,17 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
-from dataclasses import dataclass
+from contextlib import nullcontext
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import torch
 
+from hybridreg.io.lock import folder_lock
 from hybridreg.learned.training import checkpoint
 from hybridreg.learned.training.card import make_card, write_card
 from hybridreg.learned.training.checkpoint import Progress
@@ -22,9 +25,10 @@ from hybridreg.learned.training.processes import start_processes
 from hybridreg.learned.training.recipe import Recipe, Source
 from hybridreg.learned.training.record import Record
 from hybridreg.learned.training.reporting import Reporter
-from hybridreg.learned.training.resuming import check_same
+from hybridreg.learned.training.resuming import check_same, tell_changed_data
 from hybridreg.learned.training.start import first_network
-from hybridreg.learned.training.stopping import stop_on_signals
+from hybridreg.learned.training.stopping import StopFlag, stop_on_signals
+from hybridreg.workers import end_with
 
 if TYPE_CHECKING:
     from lightning_fabric import Fabric
@@ -51,26 +55,45 @@ class RunOptions:
     workers: int = 1
 
 
-def train(recipe: Recipe, options: RunOptions) -> Path | None:
+def train(recipe: Recipe, options: RunOptions, flag: StopFlag | None = None) -> Path | None:
     """Train a network; the folder of the best weights, or None where the run was stopped before its end.
+
+    Parameters
+    ----------
+    flag : hears by which signal it was stopped
 
     Raises
     ------
     FileExistsError
         ``out`` holds a run already, and it was not asked to go on.
+    InUse
+        Another process is training into ``out``.
     ValueError, FileNotFoundError
         Data that cannot be opened, or a checkpoint of another recipe.
+    OSError
+        A full disk, a folder that cannot be written to; the last checkpoint is whole.
     """
     require_data(recipe)
     before = _before(recipe, options)
+    parent = os.getppid()
     fabric = start_processes(options.devices, options.accelerator, recipe.precision)
+    if not fabric.is_global_zero or "TORCHELASTIC_RUN_ID" in os.environ:
+        end_with(parent)  # else it would wait for the others for hours
     options.out.mkdir(parents=True, exist_ok=True)
+    with folder_lock(options.out) if fabric.is_global_zero else nullcontext():
+        return _train(recipe, options, before, fabric, flag)
+
+
+def _train(
+    recipe: Recipe, options: RunOptions, before: dict[str, Any], fabric: Fabric, flag: StopFlag | None
+) -> Path | None:
     quiet = not fabric.is_global_zero
     with Reporter(options.out, quiet=quiet) as reporter, torch.random.fork_rng(devices=[]):
         training = _sources(recipe, recipe.data.train, options, fabric, reporter)
         val = _sources(recipe, recipe.data.val, options, fabric, reporter)
         network = first_network(recipe)
         if before:
+            tell_changed_data(before.get("data", {}), {source.title: source.content for source in training})
             network.load_state_dict(before["network"])
         fabric.to_device(network)
         progress = before["progress"] if before else Progress()
@@ -84,7 +107,7 @@ def train(recipe: Recipe, options: RunOptions) -> Path | None:
             total=partial(_total, fabric) if fabric.world_size > 1 else None,
         )
         # While pairs are being prepared a signal ends the process at once: what is prepared lies on the disk.
-        with stop_on_signals() as stop:
+        with stop_on_signals(flag) as stop:
             loop = Loop(fabric, recipe, network, training, options.out, record, stop)
             if not loop.run(before.get("optimizer")):
                 return None
@@ -112,7 +135,8 @@ def _sources(
 ) -> list[PairSource]:
     opened = []
     for source in wanted:
-        found = open_source(source, recipe, options.cache)
+        found = open_source(source, recipe, options.cache, told=fabric.is_global_zero)
+        found = replace(found, fingerprints=fabric.broadcast(found.fingerprints))
         if fabric.is_global_zero:
             reporter.begin(f"preparing {found.title}", len(found))
             found = prepare_all(found, options.workers, reporter.advance)

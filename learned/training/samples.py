@@ -3,8 +3,12 @@
 
 from __future__ import annotations
 
+import os
+import pickle
+import warnings
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -26,6 +30,7 @@ from hybridreg.learned.training.augmentation import (
 from hybridreg.learned.training.order import Order
 from hybridreg.learned.training.pair_source import PairSource
 from hybridreg.learned.training.prepared import PreparedPair
+from hybridreg.workers import end_with
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -114,22 +119,42 @@ def undisturbed(pair: PreparedPair, image: ImageConfig | None) -> Sample:
 
 
 def stream(samples: PhaseSamples, numbers: Iterable[int], loaders: int) -> Iterator[Sample | Unusable]:
-    """The samples of those numbers, in order."""
-    loader = DataLoader(
+    """The samples of those numbers, in order; read ahead by ``loaders`` processes.
+
+    They come through pipes, as bytes: torch's own way goes through /dev/shm, and where that is small, as in a
+    container, it waits for ever.
+
+    Warns
+    -----
+    UserWarning
+        The system cannot start processes (a full /dev/shm holds no semaphore): this one reads them itself.
+    """
+    wanted = list(numbers)
+    if loaders:
+        try:
+            return map(pickle.loads, iter(_loader(samples, wanted, loaders)))
+        except OSError as error:
+            told = f"no loaders can be started here ({error}); samples are read between the steps"
+            warnings.warn(told, UserWarning, stacklevel=2)
+    return iter(_loader(samples, wanted, 0))
+
+
+def _loader(samples: PhaseSamples, numbers: list[int], loaders: int) -> DataLoader[Any]:
+    return DataLoader(
         samples,
         batch_size=None,
-        sampler=list(numbers),
+        sampler=numbers,
         num_workers=loaders,
-        collate_fn=_as_it_is,
+        collate_fn=pickle.dumps if loaders else _as_it_is,
         prefetch_factor=4 if loaders else None,
-        worker_init_fn=_one_thread,
+        worker_init_fn=partial(_begin, os.getpid()),
     )
-    return iter(loader)
 
 
 def _as_it_is(sample: Any) -> Any:
     return sample
 
 
-def _one_thread(_: int) -> None:
+def _begin(leader: int, _: int) -> None:
     torch.set_num_threads(1)
+    end_with(leader)

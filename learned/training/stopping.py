@@ -10,25 +10,27 @@ from contextlib import contextmanager
 
 
 class StopFlag:
-    """Was the process asked to stop?"""
+    """Was the process asked to stop, and by which signal?"""
 
     def __init__(self) -> None:
-        self.asked = False
+        self.asked, self.number = False, 0
 
-    def __call__(self, *_: object) -> None:
+    def __call__(self, number: int = 0, *_: object) -> None:
         if self.asked:  # asked twice: at once
             raise KeyboardInterrupt
-        self.asked = True
+        self.asked, self.number = True, number
 
 
 @contextmanager
-def stop_on_signals() -> Iterator[StopFlag]:
-    """Catch SIGINT and SIGTERM within the block; only the main thread can."""
-    flag = StopFlag()
+def stop_on_signals(flag: StopFlag | None = None) -> Iterator[StopFlag]:
+    """Catch SIGINT, SIGTERM and SIGHUP within the block, where they are not ignored; only the main thread can."""
+    flag = flag or StopFlag()
     if threading.current_thread() is not threading.main_thread():
         yield flag
         return
-    before = {number: signal.signal(number, flag) for number in (signal.SIGINT, signal.SIGTERM)}
+    caught = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
+    heard = [number for number in caught if signal.getsignal(number) is not signal.SIG_IGN]
+    before = {number: signal.signal(number, flag) for number in heard}
     try:
         yield flag
     finally:

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import hashlib
+import os
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,6 +16,10 @@ from torch import Tensor
 from hybridreg.io.atomic import write_bytes
 
 Tensors = Mapping[str, Tensor]
+
+
+class NotKept(OSError):
+    """The cache cannot be written: the disk is full, or the folder is read-only."""
 
 
 @dataclass(frozen=True)
@@ -37,8 +42,16 @@ class TensorCache:
         """Are they there?"""
         return self.folder is not None and self.path(key).is_file()
 
-    def get(self, key: object, make: Callable[[], Tensors]) -> Tensors:
-        """The tensors of a key, read or else made; a damaged file is made anew."""
+    def get(self, key: object, make: Callable[[], Tensors], *, must_keep: bool = True) -> Tensors:
+        """The tensors of a key, read or else made; a damaged file is made anew.
+
+        ``must_keep=False`` gives them all the same where they cannot be written.
+
+        Raises
+        ------
+        NotKept
+            They cannot be written.
+        """
         if self.folder is None:
             return make()
         path = self.path(key)
@@ -48,6 +61,11 @@ class TensorCache:
             except SafetensorError:
                 path.unlink(missing_ok=True)
         tensors = make()
-        path.parent.mkdir(parents=True, exist_ok=True)
-        write_bytes(path, save({name: tensor.contiguous() for name, tensor in tensors.items()}))
+        content = save({name: tensor.contiguous() for name, tensor in tensors.items()})
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            write_bytes(path, content)
+        except OSError as error:
+            if must_keep:
+                raise NotKept(error.errno, error.strerror, os.fspath(path)) from error
         return tensors

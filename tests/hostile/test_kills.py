@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks.hostile import killed
+from benchmarks.hostile import killed, two_writers
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -24,6 +24,14 @@ def test_killed_three_times_and_begun_again(batch: Path) -> None:
     story = killed.run_killed(batch, "killed", kills=3, whole="whole", workers=1, seed=1)
     assert story.kills == 3
     killed.same_tables(batch, "whole", "killed")
+
+
+def test_two_writers_lose_nothing(batch: Path) -> None:
+    killed.run_whole(batch, "whole", 1)
+    met = two_writers.run_two(batch, "two", rounds=1, workers=1, seed=1)
+    assert met.refused + met.finished >= 1
+    killed.same_tables(batch, "whole", "two")
+    two_writers.overwrite_is_refused(batch, "beside", 1)
 
 
 @pytest.mark.parametrize(

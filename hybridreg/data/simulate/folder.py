@@ -21,7 +21,10 @@ from hybridreg.data.simulate.labelled import pair_id
 from hybridreg.data.simulate.splits import pair_number
 from hybridreg.data.simulate.thinned import thinned
 from hybridreg.data.simulate.tiers import tier_named
+from hybridreg.io.faults import naming
+from hybridreg.io.lock import folder_lock
 from hybridreg.pair import LabelledPair, Pair
+from hybridreg.workers import spread
 
 
 def write_pair(folder: Path, drawn: Drawn, facts: dict[str, Any], voxel: float | None) -> Path:
@@ -31,15 +34,16 @@ def write_pair(folder: Path, drawn: Drawn, facts: dict[str, Any], voxel: float |
     voxel: their numbers end in zero bits and compress well.
     """
     part = folder.with_name(f".{folder.name}-{uuid4().hex[:8]}")
-    part.mkdir(parents=True)
     try:
-        for name, cloud in (("source", drawn.source), ("target", drawn.target)):
-            _write_cloud(part / f"{name}.npz", thinned(cloud, voxel), small=voxel is not None)
-        (part / "image.jpg").write_bytes(drawn.jpeg)
-        (part / "meta.json").write_text(json.dumps(_meta(drawn, facts, voxel), indent=1) + "\n")
-        if folder.exists():
-            shutil.rmtree(folder)
-        os.replace(part, folder)
+        with naming(folder, instead_of=part):
+            part.mkdir(parents=True)
+            for name, cloud in (("source", drawn.source), ("target", drawn.target)):
+                _write_cloud(part / f"{name}.npz", thinned(cloud, voxel), small=voxel is not None)
+            (part / "image.jpg").write_bytes(drawn.jpeg)
+            (part / "meta.json").write_text(json.dumps(_meta(drawn, facts, voxel), indent=1) + "\n")
+            if folder.exists():
+                shutil.rmtree(folder)
+            os.replace(part, folder)
     finally:
         shutil.rmtree(part, ignore_errors=True)
     return folder
@@ -139,6 +143,10 @@ def write_pairs(
     ValueError
         Before anything is written: an unknown tier or split, a seed or number of pairs outside it, a voxel of
         no width.
+    InUse
+        Another process is writing these pairs there.
+    OSError
+        `out` cannot be written to, or the disk is full; pairs that are done are kept.
     """
     tier_named(tier)
     if pairs < 1:
@@ -152,7 +160,8 @@ def write_pairs(
 def _written(
     out: Path, tier: str, split: str, seed: int, pairs: int, voxel: float | None, workers: int
 ) -> Iterator[Path]:
-    from joblib import Parallel, delayed
-
-    jobs = (delayed(write_one)(out, tier, split, seed, index, voxel) for index in range(pairs))
-    yield from Parallel(n_jobs=workers, return_as="generator")(jobs)
+    # A folder may take several tiers at a time, but no pair two writers.
+    out.mkdir(parents=True, exist_ok=True)
+    with folder_lock(out, f"{tier}-{split}-{seed}"):
+        jobs = ((out, tier, split, seed, index, voxel) for index in range(pairs))
+        yield from spread(write_one, jobs, workers, ordered=True)
