@@ -253,11 +253,12 @@ def _with_pose(folder: Path, T: Any) -> Path:
 
 @pytest.mark.filterwarnings("ignore::UserWarning")  # the library's advice on the unit
 def test_kiss_matcher_is_not_asked_for_voxels_that_it_refuses() -> None:
-    pair, _ = sample_pair(0, 300)
+    pair, truth = sample_pair(0, 300)
     small = hr.Pair.of(pair.source.points * 1e-3, pair.target.points * 1e-3)
-    pipeline = Pipeline(match="none", estimate="kiss", refine="none")
-    with pytest.raises(ValueError, match=r"KISS-Matcher works on voxels of 0\.005 m"):
-        pipeline.run(small)
+    found = Pipeline(match="none", estimate="kiss", refine="none").run(small)
+    assert "KISS-Matcher found no pose" in " ".join(found.notes) or np.allclose(
+        found.transformation[:3, :3], truth[:3, :3], atol=0.1
+    )
 
 
 @pytest.mark.filterwarnings("ignore::UserWarning")
