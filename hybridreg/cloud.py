@@ -91,6 +91,7 @@ class PointCloud:
         place = read_viewpoint(x) if isinstance(x, (str, os.PathLike)) else None
         kept, rows = gate.finite(raw, name, drop=nonfinite == "drop")
         kept, rows = gate.returned(kept, rows, name, drop=nonfinite == "drop")
+        gate.rounded(kept, name)
         said = given(viewpoint, len(raw), name)
         offset = _whole_kilometres(kept)
         points = kept - offset if offset.any() else kept  # a copy of the caller's already

@@ -22,6 +22,8 @@ _LARGEST = 1.5e11
 _THINNEST = 1e-6
 _LOT = 2**18  # points
 _FILLED = 0.01  # share of points in the very origin from which they are no returns
+_COARSE = 0.01  # metres between coordinates from which their rounding is told
+_LOOKED_AT = 2_000  # points whose rounding is looked at
 
 
 def coordinates(x: Any, name: str) -> Array:
@@ -86,6 +88,22 @@ def returned(
     kept = np.ones(len(points), dtype=bool) if rows is None else rows.copy()
     kept[kept] = good
     return points[good], kept
+
+
+def rounded(points: Array, name: str) -> None:
+    """Warn of coordinates on a map grid that were kept in single precision, half a metre apart at 5,000 km."""
+    some = points[:: max(1, len(points) // _LOOKED_AT)]
+    with np.errstate(over="ignore"):
+        single = some.astype(np.float32)
+    kept_so = (single == some).all(axis=0)
+    step = float(np.where(kept_so, np.spacing(np.abs(single).max(axis=0, initial=0.0)), 0.0).max())
+    if step > _COARSE:
+        warnings.warn(
+            f"{name}: its coordinates were kept in single precision far from the origin, {step:.2g} m apart; export "
+            "them in double precision, or take a local origin off before they are stored",
+            UserWarning,
+            stacklevel=4,
+        )
 
 
 def check(points: Array, name: str) -> None:

@@ -31,7 +31,7 @@ def points_of(x: Any, name: str, depth: int = 0) -> Array:
     """
     if isinstance(x, np.ndarray):
         return _from_array(x, name)
-    if hasattr(x, "detach"):
+    if hasattr(x, "detach") and hasattr(x, "cpu"):
         return _from_torch(x, name)
     if messages.is_cloud(x):
         return messages.points(x, name)

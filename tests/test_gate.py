@@ -3,7 +3,9 @@
 
 from __future__ import annotations
 
+import io
 import pickle
+import warnings
 from types import SimpleNamespace
 from typing import Any
 
@@ -145,3 +147,24 @@ def test_pickles() -> None:
     cloud = pickle.loads(pickle.dumps(PointCloud.of(GOOD, sensor="fan")))
     assert cloud.sensor == "fan"
     assert np.array_equal(cloud.points, GOOD)
+
+
+@pytest.mark.parametrize("dtype, told", [("f4", True), ("f8", False)])
+def test_map_coordinates_in_single_precision_are_told(dtype: str, told: bool) -> None:
+    points = np.random.default_rng(0).uniform(-20.0, 20.0, (200, 3)) + [4e5, 5.3e6, 500.0]
+    with warnings.catch_warnings(record=True) as seen:
+        warnings.simplefilter("always")
+        PointCloud.of(points.astype(dtype), name="map")
+    assert any("map: its coordinates were kept in single precision" in str(w.message) for w in seen) == told
+
+
+def test_a_sensor_frame_in_single_precision_is_fine() -> None:
+    points = np.random.default_rng(0).uniform(-200.0, 200.0, (200, 3)).astype("f4")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        PointCloud.of(points, name="scan")
+
+
+def test_an_open_file_is_refused_with_a_cure() -> None:
+    with pytest.raises(ValueError, match=r"pass what its read\(\) returns"):
+        PointCloud.of(io.BytesIO(b"ply"))
