@@ -14,7 +14,8 @@ from scipy.spatial import cKDTree
 from hybridreg import limits
 from hybridreg.classical.voxel import voxel_centroids
 from hybridreg.matches import Correspondences, Pose
-from hybridreg.resources import n_threads, on_one_core
+from hybridreg.cores import n_threads
+from hybridreg.threads import on_one_core, single
 from hybridreg.scene import Scene
 from hybridreg.stage import Stage
 
@@ -90,10 +91,11 @@ class KissMatcher(Stage):
             solver_noise_bound_gain=min(0.75, _LARGEST_NOISE / voxel),
         )
         matcher = kiss_matcher.KISSMatcher(config)
-        found_source, found_target = matcher.match(source.T, target.T)
-        if len(found_source) < _FEWEST_MATCHES:
-            return None
-        solution = matcher.prune_and_solve(found_source, found_target)
+        with single():  # its pruning races otherwise, and hangs in a forked process
+            found_source, found_target = matcher.match(source.T, target.T)
+            if len(found_source) < _FEWEST_MATCHES:
+                return None
+            solution = matcher.prune_and_solve(found_source, found_target)
         if not solution.valid:
             return None
         T = np.eye(4)

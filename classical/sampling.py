@@ -14,7 +14,7 @@ from hybridreg import limits
 from hybridreg.cloud import PointCloud
 from hybridreg.gate import MIN_POINTS
 from hybridreg.pair import Pair
-from hybridreg.resources import n_threads
+from hybridreg.cores import n_threads
 from hybridreg.scene import Level, Scene
 from hybridreg.stage import Stage
 

@@ -15,7 +15,7 @@ from hybridreg.eval.attempt import Method, attempt, one_line
 from hybridreg.eval.controls import Control
 from hybridreg.eval.row import Row
 from hybridreg.eval.store import Appender
-from hybridreg.eval.threads import one_thread
+from hybridreg.threads import one_thread
 from hybridreg.pair import LabelledPair
 
 

@@ -7,7 +7,7 @@ import pytest
 
 import hybridreg as hr
 from hybridreg import testing
-from hybridreg.eval.threads import one_thread
+from hybridreg.threads import one_thread
 from hybridreg.resources import n_threads
 
 
