@@ -112,7 +112,7 @@ def _wheel() -> Any:
     # Its threads race, so that 1 match in 30 differed from the others. It counts the cores once in a process, at the
     # first match; where that match sees one core, all of 600 later ones were the same (1.0.2, Linux).
     points = np.random.default_rng(0).uniform(size=(3, 300))
-    with on_one_core():
+    with on_one_core(), single():
         kiss_matcher.KISSMatcher(kiss_matcher.KISSMatcherConfig(0.2, use_voxel_sampling=False)).match(
             points, points
         )

@@ -13,6 +13,7 @@ from hybridreg.data.dataset import fingerprint_of, ids_of
 from hybridreg.eval import truth
 from hybridreg.eval.attempt import Method, attempt, one_line
 from hybridreg.eval.controls import Control
+from hybridreg.eval.own_workers import own_workers_only
 from hybridreg.eval.row import Row
 from hybridreg.eval.store import Appender
 from hybridreg.threads import one_thread
@@ -42,7 +43,7 @@ def predict(
     seed : int
         With a pair's id it fixes all randomness, so that neither order nor workers change a row.
     workers : int or None
-        Processes, each with one thread. None takes what `joblib.parallel_config` says, else 1: under
+        Processes, each with one thread; pairs at a time where another backend runs them. None takes what `joblib.parallel_config` says, else 1: under
         `joblib.parallel_config(backend="dask")` the pairs spread over a cluster, and those of a lost machine
         are done by the others. A pair that kills its process is a failed row with two or more workers; with
         one it takes this process along, and on dask joblib (1.6) waits for it for ever.
@@ -139,9 +140,14 @@ def _parallel(
     workers: int | None,
 ) -> Iterator[Row]:
     from joblib import Parallel, delayed
+    from joblib.parallel import get_active_backend
 
-    # One pair a task, so that a row is on the disk as soon as it is done.
-    run = Parallel(n_jobs=workers, return_as="generator_unordered", batch_size=1, pre_dispatch="2*n_jobs")
+    own_workers_only()
+    # One pair a task, so that a row is on the disk as soon as it is done. On dask joblib (1.6) takes all cores whatever
+    # `n_jobs` says; but no more than `pre_dispatch` tasks wait or run, there and elsewhere.
+    wanted = get_active_backend()[1] if workers is None else workers
+    ahead = wanted if wanted is not None and wanted > 0 else "2*n_jobs"
+    run = Parallel(n_jobs=workers, return_as="generator_unordered", batch_size=1, pre_dispatch=ahead)
     rows: Iterator[Row] = run(delayed(predict_pair)(method, pairs, i, ids[i], seed) for i in indices)
     return rows
 

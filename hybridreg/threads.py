@@ -15,7 +15,7 @@ import threading
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, contextmanager, suppress
-from typing import Any
+from typing import Any, Literal
 
 from hybridreg.cores import n_threads
 
@@ -66,10 +66,15 @@ class _Held:
             self._undo()
 
 
-def _limit_blas() -> Callable[[], Any]:
-    from threadpoolctl import threadpool_limits
+def _limit(kind: Literal["blas", "openmp"]) -> Any:
+    from threadpoolctl import ThreadpoolController
 
-    undo: Callable[[], Any] = threadpool_limits(1, user_api="blas").restore_original_limits
+    # Selected first: `threadpool_limits(user_api=...)` gives back the numbers of the other kind too.
+    return ThreadpoolController().select(user_api=kind).limit(limits=1)
+
+
+def _limit_blas() -> Callable[[], Any]:
+    undo: Callable[[], Any] = _limit("blas").restore_original_limits
     return undo
 
 
@@ -117,10 +122,8 @@ def single() -> Iterator[None]:
     OpenMP counts threads for each Python thread, BLAS and torch for the whole process. A library that is imported
     within the block goes its own way: import it before.
     """
-    from threadpoolctl import threadpool_limits
-
     with ExitStack() as held:
-        held.enter_context(threadpool_limits(1, user_api="openmp"))
+        held.enter_context(_limit("openmp"))
         held.enter_context(_one_blas())
         if "torch" in sys.modules:  # it takes a second and a half to load
             held.enter_context(_one_torch())
