@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 
 from hybridreg import limits, se3
 from hybridreg.classical.voxel import voxel_centroids
+from hybridreg.cores import n_threads
 from hybridreg.fitness import measure
 from hybridreg.matches import Pose
 from hybridreg.normals import tree
-from hybridreg.resources import n_threads, n_workers
 from hybridreg.scene import Scene
 from hybridreg.stage import Stage
 from hybridreg.wheels import load
@@ -79,7 +79,7 @@ class Gicp(Stage):
             if rests and not last:
                 continue
             still = 1.0 if last else _COARSE
-            # One thread: with more, the order of summation and so the last digits depend on the machine.
+            # One thread (`hybridreg.threads`); with more, the order of summation and so the last digits depend on the machine.
             found = small_gicp.align(
                 target,
                 source,
@@ -126,7 +126,6 @@ def _within(scene: Scene, T: Array, voxel: float, reach: float) -> Array:
 def _surfaces(points: Array, neighbours: int) -> tuple[Any, Any]:
     small_gicp = load("small_gicp", 'refine="gicp"')
     cloud = small_gicp.PointCloud(points)
-    kd_tree = small_gicp.KdTree(cloud, num_threads=n_workers())
-    # Each point's covariance is its own sum, so here the number of threads changes nothing.
-    small_gicp.estimate_covariances(cloud, kd_tree, min(neighbours, cloud.size()), n_workers())
+    kd_tree = small_gicp.KdTree(cloud, num_threads=1)
+    small_gicp.estimate_covariances(cloud, kd_tree, min(neighbours, cloud.size()), 1)
     return cloud, kd_tree

@@ -13,10 +13,11 @@ from scipy.spatial import cKDTree
 
 from hybridreg import limits, wheels
 from hybridreg.classical.voxel import voxel_centroids
+from hybridreg.cores import n_threads
 from hybridreg.matches import Correspondences, Pose
-from hybridreg.resources import n_threads, on_one_core
 from hybridreg.scene import Scene
 from hybridreg.stage import Stage
+from hybridreg.threads import on_one_core, single
 
 Array = NDArray[np.float64]
 
@@ -85,10 +86,11 @@ class KissMatcher(Stage):
             solver_noise_bound_gain=min(0.75, _LARGEST_NOISE / voxel),
         )
         matcher = kiss_matcher.KISSMatcher(config)
-        found_source, found_target = matcher.match(source.T, target.T)
-        if len(found_source) < _FEWEST_MATCHES:
-            return None
-        solution = matcher.prune_and_solve(found_source, found_target)
+        with single():  # its pruning races otherwise, and hangs in a forked process
+            found_source, found_target = matcher.match(source.T, target.T)
+            if len(found_source) < _FEWEST_MATCHES:
+                return None
+            solution = matcher.prune_and_solve(found_source, found_target)
         if not solution.valid:
             return None
         T = np.eye(4)
@@ -102,7 +104,7 @@ def _wheel() -> Any:
     # Its threads race, so that 1 match in 30 differed from the others. It counts the cores once in a process, at the
     # first match; where that match sees one core, all of 600 later ones were the same (1.0.2, Linux).
     points = np.random.default_rng(0).uniform(size=(3, 300))
-    with on_one_core():
+    with on_one_core(), single():
         kiss_matcher.KISSMatcher(kiss_matcher.KISSMatcherConfig(0.2, use_voxel_sampling=False)).match(
             points, points
         )

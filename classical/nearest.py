@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from threadpoolctl import threadpool_limits
+
+from hybridreg.threads import single
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -49,7 +50,7 @@ def nearest(source: Array, target: Array) -> Nearest:
     index = np.empty(len(a), dtype=np.int64)
     best, second = np.empty(len(a), dtype=np.float32), np.empty(len(a), dtype=np.float32)
     column_best = np.full(len(b), np.inf, dtype=np.float32)
-    with threadpool_limits(limits=1, user_api="blas"):
+    with single():
         for start in range(0, len(a), _ROWS):
             block = slice(start, start + _ROWS)
             squares = left[block] @ right

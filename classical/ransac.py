@@ -9,7 +9,6 @@ from typing import ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from threadpoolctl import threadpool_limits
 
 from hybridreg import se3
 from hybridreg.classical import hypotheses
@@ -19,6 +18,7 @@ from hybridreg.classical.svd import kabsch
 from hybridreg.matches import Correspondences, Pose
 from hybridreg.scene import Scene
 from hybridreg.stage import Stage
+from hybridreg.threads import single
 
 Array = NDArray[np.float64]
 
@@ -89,8 +89,8 @@ class Ransac(Stage):
             return Pose.unknown(len(matches))
         max_distance = self.max_distance or 1.5 * (matches.spacing or scene.spacing)
         source, target, weight = matches.source[rows], matches.target[rows], matches.weight[rows]
-        # One BLAS thread: how a matrix product is split among threads may decide the last bit of its entries.
-        with threadpool_limits(limits=1, user_api="blas"):
+        # One thread: how a matrix product is split among threads may decide the last bit of its entries.
+        with single():
             if self.backend == "open3d":
                 from hybridreg.classical.ransac_open3d import ransac_open3d
 

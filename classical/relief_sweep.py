@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from hybridreg import se3
 from hybridreg.classical.sweep import BestYaws
-from hybridreg.resources import n_threads
+from hybridreg.cores import n_threads
 from hybridreg.verdict.relief import Relief, nats
 
 Array = NDArray[np.float64]

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from hybridreg import se3
 from hybridreg.classical.columns import FromAbove
 from hybridreg.classical.signed import blurred, signed
-from hybridreg.resources import n_threads
+from hybridreg.cores import n_threads
 
 Array = NDArray[np.float64]
 Floats = NDArray[np.float32]

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from hybridreg import se3
+from hybridreg.cores import n_threads
 from hybridreg.extent import bounds
-from hybridreg.resources import n_threads, n_workers
 
 Array = NDArray[np.float64]
 
@@ -55,7 +55,7 @@ class Overlay:
     @cached_property
     def _both_ways(self) -> tuple[Fitness, Fitness]:
         # Side by side, as one thread alone builds a tree.
-        with ThreadPoolExecutor(min(2, n_workers())) as pool:
+        with ThreadPoolExecutor(min(2, n_threads())) as pool:
             T = self.T_target_source
             forth = pool.submit(measure, self.source, self.target, T, self.max_distance)
             back = pool.submit(measure, self.target, self.source, se3.inverse(T), self.max_distance)

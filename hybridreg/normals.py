@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from hybridreg.resources import n_workers
 from hybridreg.scene import Level, Scene
 from hybridreg.wheels import load
 
@@ -44,9 +43,10 @@ def estimate(points: Array, viewpoint: Array | None, k: int = 20) -> Array:
     # All neighbours several times over tell the same.
     times = -(-_FEWEST // k)
     cloud = small_gicp.PointCloud(np.tile(points, (times, 1)))
-    # Each point's normal is its own sum, so the number of threads changes nothing.
-    tree = small_gicp.KdTree(cloud, num_threads=n_workers())
-    small_gicp.estimate_normals(cloud, tree, times * k, n_workers())
+    # One thread (`hybridreg.threads`): with two, a level of 5,000 points took as long on idle cores, and 2.5 times as
+    # long on busy ones.
+    tree = small_gicp.KdTree(cloud, num_threads=1)
+    small_gicp.estimate_normals(cloud, tree, times * k, 1)
     found: Array = cloud.normals()[: len(points), :3]
     towards = np.array([0.0, 0.0, 1.0]) if viewpoint is None else _nearest(viewpoint, points) - points
     away = np.einsum("ni,ni->n", found, np.broadcast_to(towards, found.shape)) < 0.0

@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from hybridreg.cores import query_threads
 from hybridreg.extent import radii
 from hybridreg.extent import reach as reach_of
-from hybridreg.resources import query_threads
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]

@@ -3,15 +3,12 @@
 
 from __future__ import annotations
 
-import os
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 _PROCESS = Path("/proc/self")
-# Points of a query that are shared among threads.
-_MANY = 4_000
 
 
 @contextmanager
@@ -22,36 +19,6 @@ def stopwatch(seconds: dict[str, float], stage: str) -> Iterator[None]:
         yield
     finally:
         seconds[stage] = seconds.get(stage, 0.0) + time.perf_counter() - start
-
-
-def n_threads() -> int:
-    """Threads for one KD-tree query: what OMP_NUM_THREADS says, as numpy and OpenMP take it, else -1 for all."""
-    said = os.environ.get("OMP_NUM_THREADS", "").partition(",")[0]
-    return int(said) if said.isdigit() and int(said) > 0 else -1
-
-
-def query_threads(n: int) -> int:
-    """Threads for a KD-tree query of n points: to start them takes as long as to ask for a thousand points."""
-    return n_threads() if n > _MANY else 1
-
-
-def n_workers() -> int:
-    """The same as a number of threads, for libraries to which -1 means nothing."""
-    return n_threads() if n_threads() > 0 else os.cpu_count() or 1
-
-
-@contextmanager
-def on_one_core() -> Iterator[None]:
-    """Keep this thread, and those that it starts, on one core for the block, where the system can (Linux)."""
-    if not hasattr(os, "sched_setaffinity"):
-        yield
-        return
-    cores = os.sched_getaffinity(0)
-    os.sched_setaffinity(0, {min(cores)})
-    try:
-        yield
-    finally:
-        os.sched_setaffinity(0, cores)
 
 
 def reset_peak_memory() -> None:

@@ -15,6 +15,8 @@ T = TypeVar("T")
 # How often a worker looks whether its leader still lives, seconds.
 _LOOK = 0.25
 _watching = False
+_process = os.getpid()
+_parents: list[Any] = []
 
 
 def spread(
@@ -39,13 +41,32 @@ def spread(
         The system cannot start processes (a full /dev/shm); the work is done in this one.
     """
     from joblib import Parallel, delayed
+    from joblib.parallel import get_active_backend
 
-    many: dict[str, Any] = {"batch_size": 1, "pre_dispatch": "2*n_jobs"} if singly else {}
+    _own_workers_only()
+    # On dask joblib (1.6) takes all cores whatever `n_jobs` says; but no more than `pre_dispatch` tasks wait or run.
+    wanted = get_active_backend()[1] if workers is None else workers
+    ahead = wanted if wanted is not None and wanted > 0 else "2*n_jobs"
+    many: dict[str, Any] = {"batch_size": 1, "pre_dispatch": ahead} if singly else {}
     how: Literal["generator", "generator_unordered"] = "generator" if ordered else "generator_unordered"
     leader = os.getpid()
     tasks = (delayed(led)(leader, function, job) for job in jobs)
     results: Iterator[T] = Parallel(n_jobs=workers, return_as=how, **many)(tasks)
     return results
+
+
+def _own_workers_only() -> None:
+    """Forget the pool of worker processes that joblib's loky keeps, where this process was forked since: joblib (1.6)
+    would wait for ever for the parent's."""
+    global _process
+    if _process == os.getpid():
+        return
+    _process = os.getpid()
+    from joblib.externals.loky import reusable_executor
+
+    # Kept, as its end would be told to threads that are not in this process.
+    _parents.append(getattr(reusable_executor, "_executor", None))
+    reusable_executor._executor = None
 
 
 def led(leader: int, function: Callable[..., T], job: tuple[Any, ...]) -> T:

@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybridreg import se3
+from hybridreg.cores import query_threads
 from hybridreg.range_image import Seen
-from hybridreg.resources import query_threads
 from hybridreg.verdict.axes import faced, main_axes
 from hybridreg.verdict.relief import Alike, alike
 from hybridreg.verdict.upright import overturned

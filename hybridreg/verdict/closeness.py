@@ -17,8 +17,8 @@ from scipy.spatial import cKDTree
 
 from hybridreg import se3
 from hybridreg.cloud import PointCloud
+from hybridreg.cores import n_threads
 from hybridreg.extent import bounds, reach
-from hybridreg.resources import n_workers
 from hybridreg.scene import Scene
 from hybridreg.verdict.settle import descend
 
@@ -119,7 +119,7 @@ def fine_surfaces(scene: Scene) -> tuple[Surfaces, Surfaces]:
     def make() -> tuple[Surfaces, Surfaces]:
         clouds = (scene.pair.source, scene.pair.target)
         scale = min(1.0, *(reach(cloud.radii) / _FROM for cloud in clouds)) or 1.0
-        with ThreadPoolExecutor(min(2, n_workers())) as pool:
+        with ThreadPoolExecutor(min(2, n_threads())) as pool:
             source, target = pool.map(lambda cloud: _surfaces(cloud, scale), clouds)
             return source, target
 

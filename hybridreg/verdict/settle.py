@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from hybridreg import se3
-from hybridreg.resources import query_threads
+from hybridreg.cores import query_threads
 from hybridreg.verdict.information import jacobian
 from hybridreg.verdict.views import View
 

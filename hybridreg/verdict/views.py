@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from hybridreg import ground, normals
+from hybridreg.cores import n_threads
 from hybridreg.ground import Ground
 from hybridreg.range_image import RangeImage, RangeImages
 from hybridreg.resolution import default_voxel, map_cell
-from hybridreg.resources import n_workers
 from hybridreg.scene import Level, Scene, centre
 from hybridreg.verdict.axes import balanced
 from hybridreg.verdict.relief import Relief
@@ -85,7 +85,7 @@ def _both(scene: Scene) -> tuple[View, View]:
     wanted = spacing(scene)
     on_grid = ground.on_grid(scene, map_cell(scene.pair.source, scene.pair.target))
     # Side by side: most of it is sorting and trees, which each take one thread.
-    with ThreadPoolExecutor(min(2, n_workers())) as pool:
+    with ThreadPoolExecutor(min(2, n_threads())) as pool:
         source = pool.submit(_view, scene, "source", wanted, on_grid)
         target = pool.submit(_view, scene, "target", wanted, on_grid)
         return source.result(), target.result()

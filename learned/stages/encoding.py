@@ -13,6 +13,7 @@ from hybridreg.learned.network import Encoding
 from hybridreg.learned.stages.levelling import Turns, likeness
 from hybridreg.learned.stages.network_stage import NetworkStage
 from hybridreg.scene import Scene
+from hybridreg.threads import single
 
 # Spacings that differ by less are one; beyond the second factor the scene itself may be of another size.
 _SAME, _ANOTHER_SCALE = 0.01, 2.0
@@ -32,7 +33,7 @@ def _encode(scene: Scene, stage: NetworkStage) -> Encoding:
     # Cylindrical kernel points take z for the vertical, and sensors may hang in any way. The ground tells which,
     # unless a wall was taken for it: both are tried.
     upright = Turns.upright(scene) if network.config.backbone.kernel == "cylindrical" else None
-    with torch.inference_mode():
+    with single(), torch.inference_mode():
         as_given = _encode_turned(scene, stage, Turns.none())
         if upright is None:
             return as_given

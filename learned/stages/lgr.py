@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
-from threadpoolctl import threadpool_limits
 
 from hybridreg import se3
 from hybridreg.classical.consensus import Consensus
@@ -17,6 +16,7 @@ from hybridreg.classical.svd import kabsch
 from hybridreg.matches import Correspondences, Pose
 from hybridreg.scene import Scene
 from hybridreg.stage import Stage
+from hybridreg.threads import single
 
 if TYPE_CHECKING:
     from hybridreg.learned.lgr import LgrEstimate
@@ -69,11 +69,13 @@ class Lgr(Stage):
             raise ValueError(f"rival_share={self.rival_share} must lie in [0, 1]")
 
     def __call__(self, scene: Scene, matches: Correspondences, rng: np.random.Generator) -> Pose:
+        import torch  # noqa: F401  (`single` holds what is loaded)
+
         rows = _usable(matches)
         if len(rows) < 3:
             return Pose.unknown(len(matches))
         max_distance = self.max_distance or matches.spacing or 2.0 * scene.spacing
-        with threadpool_limits(limits=1, user_api="blas"):
+        with single():
             found = self._estimate(scene, matches, rows, max_distance)
             T: Array = found.transform.numpy()
             residual = np.linalg.norm(se3.apply(T, matches.source[rows]) - matches.target[rows], axis=1)

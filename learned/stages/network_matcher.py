@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, ClassVar
 from hybridreg.learned.stages.network_stage import NetworkStage
 from hybridreg.matches import Correspondences, Overlap
 from hybridreg.scene import Scene
+from hybridreg.threads import single
 
 if TYPE_CHECKING:
     from hybridreg.learned.network import RegistrationNetwork
@@ -47,7 +48,7 @@ class NetworkMatcher(NetworkStage):
         from hybridreg.learned.stages.kept_superpoints import keep
 
         network, encoding = self.network(), encode(scene, self)
-        with torch.inference_mode():
+        with single(), torch.inference_mode():
             kept = keep(scene, overlap, encoding, network.config, self.min_overlap)
             features = network.attend(encoding, kept)
             _, matches = network.match(encoding, kept, features, filtered=self.filtered)

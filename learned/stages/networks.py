@@ -14,6 +14,7 @@ from hybridreg.learned.pretrained import network_class
 from hybridreg.learned.sizes import named_config
 from hybridreg.learned.untrained import untrained_parts
 from hybridreg.learned.weights import find_files, from_pretrained, load_official
+from hybridreg.threads import single
 
 _DEFAULT_SIZE = "nano"
 _CHECKPOINTS = (".tar", ".pth", ".pt")
@@ -61,7 +62,7 @@ def _load(name: NetworkName, stamp: tuple[int, ...]) -> Loaded:
     if name.device.startswith("cuda") and not torch.cuda.is_available():
         raise ValueError(f"device={name.device!r}: torch finds no GPU here; use device='cpu'")
     # A module draws weights when it is made; the caller's generator must not notice.
-    with torch.random.fork_rng(devices=[]):
+    with single(), torch.random.fork_rng(devices=[]):
         torch.default_generator.manual_seed(0)
         network = _make(name)
     return Loaded(network.to(name.device).eval().requires_grad_(False), untrained_parts(network))

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, ClassVar
 from hybridreg.learned.stages.network_stage import NetworkStage
 from hybridreg.matches import Overlap
 from hybridreg.scene import Scene
+from hybridreg.threads import single
 
 if TYPE_CHECKING:
     from hybridreg.learned.network import RegistrationNetwork
@@ -33,7 +34,7 @@ class Omp(NetworkStage):
         from hybridreg.learned.stages.spreading import spread
 
         network, encoding = self.network(), encode(scene, self)
-        with torch.inference_mode():
+        with single(), torch.inference_mode():
             logits = network.predict_overlap(encoding)
             assert logits is not None, "check() lets no network without OMP through"
             if not logits.informed:

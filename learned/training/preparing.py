@@ -43,7 +43,7 @@ def _run(source: PairSource, missing: list[int], workers: int) -> Iterator[tuple
 
 
 def _prepare(source: PairSource, index: int) -> tuple[int, str | None]:
-    from hybridreg.eval.threads import one_thread
+    from hybridreg.threads import one_thread
 
     with one_thread():
         return index, source.prepare(index)

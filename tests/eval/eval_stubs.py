@@ -120,6 +120,25 @@ class Moody:
         return answers[mood] if mood in answers else kabsch(pair.source.points[:200], pair.target.points)
 
 
+@dataclass(frozen=True)
+class Logged:
+    """A plain callable that finds nothing, and writes down when it began and ended."""
+
+    log: str
+    seconds: float = 0.3
+
+    def __call__(self, pair: Pair, seed: int) -> None:
+        began = time.time()
+        time.sleep(self.seconds)
+        with Path(self.log).open("a") as file:
+            file.write(f"{began} {time.time()}\n")
+
+    def at_once(self) -> int:
+        """The most pairs that ran at one time."""
+        spans = [tuple(map(float, line.split())) for line in Path(self.log).read_text().splitlines()]
+        return max(sum(began <= start < ended for began, ended in spans) for start, _ in spans)
+
+
 def row(index: int, rre_deg: float, rte_m: float, **changes: Any) -> Row:
     """A row whose pose is off by just these errors."""
     truth = se3.from_rt(se3.random_rotation(np.random.default_rng(index)), np.array([3.0, -2.0, 1.0]))

@@ -14,10 +14,10 @@ from typing import Any
 import joblib
 import numpy as np
 import pytest
-from eval_stubs import Moody, RowByRow, Scattered
+from eval_stubs import Logged, Moody, RowByRow, Scattered
 
 from hybridreg.eval import predict
-from hybridreg.eval.threads import one_thread
+from hybridreg.threads import one_thread
 
 N = 8
 
@@ -82,6 +82,18 @@ def test_a_dask_cluster_gives_the_same_rows(
     with joblib.parallel_config(backend="dask", wait_for_workers_timeout=30):
         rows = predict(RowByRow(slip=0.1), Scattered(N), tmp_path / "p.jsonl", seed=3)
     np.testing.assert_equal([row.timeless for row in rows], alone)
+
+
+@pytest.mark.parametrize(
+    ("workers", "said", "at_once"), [(None, None, 2), (1, None, 1), (2, None, 2), (None, 1, 1), (2, 1, 2)]
+)
+def test_workers_hold_on_a_cluster(
+    tmp_path: Path, cluster: Any, workers: int | None, said: int | None, at_once: int
+) -> None:
+    method = Logged(str(tmp_path / "log"))
+    with joblib.parallel_config(backend="dask", wait_for_workers_timeout=30, n_jobs=said):
+        predict(method, Scattered(6), tmp_path / "p.jsonl", workers=workers)
+    assert method.at_once() == at_once
 
 
 def test_both_workers_of_a_cluster_work_and_one_may_be_killed(tmp_path: Path, cluster: Any) -> None:
