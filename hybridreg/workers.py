@@ -8,6 +8,7 @@ import os
 import threading
 import time
 from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from typing import Any, Literal, TypeVar
 
 T = TypeVar("T")
@@ -15,7 +16,7 @@ T = TypeVar("T")
 # How often a worker looks whether its leader still lives, seconds.
 _LOOK = 0.25
 _watching = False
-_process = os.getpid()
+_process = _seen = os.getpid()
 _parents: list[Any] = []
 
 
@@ -43,7 +44,6 @@ def spread(
     from joblib import Parallel, delayed
     from joblib.parallel import get_active_backend
 
-    _own_workers_only()
     # On dask joblib (1.6) takes all cores whatever `n_jobs` says; but no more than `pre_dispatch` tasks wait or run.
     wanted = get_active_backend()[1] if workers is None else workers
     ahead = wanted if wanted is not None and wanted > 0 else "2*n_jobs"
@@ -51,22 +51,31 @@ def spread(
     how: Literal["generator", "generator_unordered"] = "generator" if ordered else "generator_unordered"
     leader = os.getpid()
     tasks = (delayed(led)(leader, function, job) for job in jobs)
-    results: Iterator[T] = Parallel(n_jobs=workers, return_as=how, **many)(tasks)
-    return results
+    with _own_workers():
+        yield from Parallel(n_jobs=workers, return_as=how, **many)(tasks)
 
 
-def _own_workers_only() -> None:
-    """Forget the pool of worker processes that joblib's loky keeps, where this process was forked since: joblib (1.6)
-    would wait for ever for the parent's."""
-    global _process
-    if _process == os.getpid():
-        return
-    _process = os.getpid()
+@contextmanager
+def _own_workers() -> Iterator[None]:
+    """Within the block joblib's loky starts workers of this process; where it is a child, they end with the block.
+
+    loky (joblib 1.6) keeps its workers for the next call. A forked process would wait for ever for those of its parent,
+    and one of multiprocessing's waits at its end until its own have been idle for five minutes.
+    """
+    global _seen
     from joblib.externals.loky import reusable_executor
 
-    # Kept, as its end would be told to threads that are not in this process.
-    _parents.append(getattr(reusable_executor, "_executor", None))
-    reusable_executor._executor = None
+    if _seen != os.getpid():
+        _seen = os.getpid()
+        # Kept, as its end would be told to threads that are not in this process.
+        _parents.append(getattr(reusable_executor, "_executor", None))
+        reusable_executor._executor = None
+    try:
+        yield
+    finally:
+        executor = getattr(reusable_executor, "_executor", None)
+        if executor is not None and (_process != os.getpid() or multiprocessing.parent_process()):
+            executor.shutdown(wait=True)
 
 
 def led(leader: int, function: Callable[..., T], job: tuple[Any, ...]) -> T:
