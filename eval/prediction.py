@@ -49,8 +49,8 @@ def predict(
     workers : int or None
         Processes, each with one thread; pairs at a time where another backend runs them. None takes what
         `joblib.parallel_config` says, else 1: under `joblib.parallel_config(backend="dask")` the pairs spread over a
-        cluster, and those of a lost machine are done by the others. A pair that kills its process is a failed row with two or more workers; with
-        one it takes this process along, and on dask joblib (1.6) waits for it for ever.
+        cluster, and those of a lost machine are done by the others. A pair that kills its process is a failed row with
+        two or more workers; with one it takes this process along, and on dask joblib (1.6) waits for it for ever.
     overwrite : bool
         Begin anew, whatever the file holds.
     data : str
