@@ -13,7 +13,7 @@ from hybridreg.data.dataset import fingerprint_of, ids_of
 from hybridreg.eval import truth
 from hybridreg.eval.attempt import Method, attempt, one_line
 from hybridreg.eval.controls import Control
-from hybridreg.eval.own_workers import own_workers_only
+from hybridreg.eval.own_workers import own_workers
 from hybridreg.eval.row import Row
 from hybridreg.eval.store import Appender
 from hybridreg.threads import one_thread
@@ -123,9 +123,10 @@ def _rows(
 
     left = set(missing)
     try:
-        for row in _parallel(method, pairs, ids, missing, seed, workers):
-            left.discard(row.index)
-            yield row
+        with own_workers():
+            for row in _parallel(method, pairs, ids, missing, seed, workers):
+                left.discard(row.index)
+                yield row
     except TerminatedWorkerError:
         # Some pair killed its process and took others along. Alone in a process each, the others go through.
         yield from _one_by_one(method, pairs, ids, sorted(left), seed)
@@ -142,7 +143,6 @@ def _parallel(
     from joblib import Parallel, delayed
     from joblib.parallel import get_active_backend
 
-    own_workers_only()
     # One pair a task, so that a row is on the disk as soon as it is done. On dask joblib (1.6) takes all cores whatever
     # `n_jobs` says; but no more than `pre_dispatch` tasks wait or run, there and elsewhere.
     wanted = get_active_backend()[1] if workers is None else workers

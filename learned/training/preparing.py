@@ -6,7 +6,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable, Iterator
 
-from hybridreg.eval.own_workers import own_workers_only
+from hybridreg.eval.own_workers import own_workers
 from hybridreg.learned.training.pair_source import PairSource
 
 _log = logging.getLogger(__name__)
@@ -41,9 +41,9 @@ def prepare_all(source: PairSource, workers: int, on_pair: Callable[[], None] = 
 def _run(source: PairSource, missing: list[int], workers: int) -> Iterator[tuple[int, str | None]]:
     from joblib import Parallel, delayed
 
-    own_workers_only()
     run = Parallel(n_jobs=workers, return_as="generator_unordered")
-    yield from run(delayed(_prepare)(source, index) for index in missing)
+    with own_workers():
+        yield from run(delayed(_prepare)(source, index) for index in missing)
 
 
 def _prepare(source: PairSource, index: int) -> tuple[int, str | None]:
