@@ -92,7 +92,8 @@ class Gicp(Stage):
                 translation_epsilon=still * _STILL_M,
                 num_threads=1,
             )
-            T, rests = found.T_target_source, found.iterations <= 1
+            # `iterations` (1.0.1) is the number of the last step, from zero, also of steps that ran out.
+            T, rests = found.T_target_source, found.converged and found.iterations == 0
         return not_worse(scene, pose, np.asarray(T))
 
 

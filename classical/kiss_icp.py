@@ -3,13 +3,13 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 
-from hybridreg import limits
+from hybridreg import limits, se3
 from hybridreg.classical.gicp import not_worse
-from hybridreg.classical.voxel import voxel_centroids
 from hybridreg.matches import Pose
 from hybridreg.scene import Scene
 from hybridreg.stage import Stage
@@ -17,12 +17,18 @@ from hybridreg.wheels import load
 
 # The map drops points beyond this range; the target is one scan, nothing of it is to be dropped.
 _EVERYTHING = 1e6
-_POINTS_PER_VOXEL = 20
+# KISS-ICP's density (its `max_points_per_voxel`, `voxel_size` and two rounds of sampling, config and pipeline of 1.3.0).
+_POINTS_PER_VOXEL, _MAP_SAMPLING, _SOURCE_SAMPLING = 20, 0.5, 1.5
+_REACH = 3.0  # sigmas
 
 
 @dataclass(frozen=True, kw_only=True)
 class KissIcp(Stage):
     """Align the source to a voxel map of the target with a Geman-McClure kernel.
+
+    KISS-ICP looks for a partner in the 27 cells around a point only, so the map's cells are as long as the farthest
+    partner is away, and hold as many more points. The clouds are sampled as KISS-ICP does it: it keeps points, where
+    centroids of two grids would lie 3 to 11 cm beside each other on identical clouds.
 
     Parameters
     ----------
@@ -30,7 +36,7 @@ class KissIcp(Stage):
         Scale of the kernel, metres; partners are sought up to three times as far. None takes 2.5 spacings of the
         levels (KISS-ICP starts at 2 m on vehicle LiDAR).
     voxel : float or None
-        Cell of the map, metres; None takes 1.25 spacings.
+        Resolution, metres: KISS-ICP's voxel size, of which it keeps 20 points a cell. None takes 1.25 spacings.
     iterations : int
         At most.
     """
@@ -46,21 +52,33 @@ class KissIcp(Stage):
     def __call__(self, scene: Scene, pose: Pose) -> Pose:
         VoxelHashMap = load("kiss_icp.mapping", 'refine="kiss-icp"').VoxelHashMap
         Registration = load("kiss_icp.registration", 'refine="kiss-icp"').Registration
+        voxel_down_sample = load("kiss_icp.voxelization", 'refine="kiss-icp"').voxel_down_sample
 
         sigma = self.sigma or 2.5 * scene.spacing
         voxel = self.voxel or 1.25 * scene.spacing
+        reach = _REACH * sigma
+        cell = max(voxel, reach)
+        # It keeps points at least cell / sqrt(points per cell) apart: the same distance in a larger cell.
+        points_per_cell = math.ceil(_POINTS_PER_VOXEL * (cell / voxel) ** 2)
         local_map = VoxelHashMap(
-            voxel_size=voxel, max_distance=_EVERYTHING, max_points_per_voxel=_POINTS_PER_VOXEL
+            voxel_size=cell, max_distance=_EVERYTHING, max_points_per_voxel=points_per_cell
         )
-        local_map.add_points(voxel_centroids(scene.pair.target.points, 0.5 * voxel))
+        # Copies, because it refuses arrays that are read-only, as a cloud's are.
+        source, target = (
+            voxel_down_sample(cloud.points.copy(), _MAP_SAMPLING * voxel)
+            for cloud in (scene.pair.source, scene.pair.target)
+        )
+        local_map.add_points(target)
+        start = np.array(pose.T, dtype=np.float64)
+        start[:3, :3] = se3.project(start[:3, :3])  # it ends the process where a rotation is a little off
         registration = Registration(
             max_num_iterations=self.iterations, convergence_criterion=1e-4, max_num_threads=1
         )
         T = registration.align_points_to_map(
-            points=voxel_centroids(scene.pair.source.points, 1.5 * voxel),
+            points=voxel_down_sample(source, _SOURCE_SAMPLING * voxel),
             voxel_map=local_map,
-            initial_guess=pose.T,
-            max_correspondance_distance=3.0 * sigma,
+            initial_guess=start,
+            max_correspondance_distance=reach,
             kernel=sigma,
         )
         return not_worse(scene, pose, np.asarray(T))

@@ -148,7 +148,7 @@ def on_loky(preset: str) -> None:
     child.join(SECONDS)
     if child.exitcode != 0:
         child.kill()
-        sys.exit(f"{preset}: workers of a forked process ended with {child.exitcode}")
+        sys.exit(f"{preset}: a forked process with workers ended with {child.exitcode}")
 
 
 def _table(preset: str, expected: Any) -> None:

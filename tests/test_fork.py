@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 HERE = Path(__file__).resolve().parent
-SECONDS = 180.0
+SECONDS = 100.0
 _NEEDS = {
     "after_others": ("torch", "open3d", "kiss_matcher"),
     "on_dask": ("distributed",),

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -105,6 +106,71 @@ def test_gicp_leaves_a_pose_without_any_partner_as_it_is(courtyard_scene: tuple[
     away = se3.from_rt(np.eye(3), np.array([500.0, 0.0, 0.0]))
     assert _asked(scene, Pose(away)) == []
     assert np.array_equal(hr.Gicp()(scene, Pose(away)).T, away)
+
+
+@pytest.mark.parametrize(
+    ("converged", "iterations", "rounds"), [(True, 0, 2), (True, 1, 3), (False, 0, 3), (False, 29, 3)]
+)
+def test_gicp_leaves_out_the_middle_round_of_what_rested_at_the_first_step(
+    monkeypatch: pytest.MonkeyPatch,
+    courtyard_scene: tuple[Scene, np.ndarray],
+    converged: bool,
+    iterations: int,
+    rounds: int,
+) -> None:
+    scene, truth = courtyard_scene
+    reaches = []
+
+    def align(target: Any, source: Any, tree: Any, **options: Any) -> Any:
+        reaches.append(options["max_correspondence_distance"])
+        return SimpleNamespace(T_target_source=truth, converged=converged, iterations=iterations)
+
+    monkeypatch.setattr(small_gicp, "align", align)
+    hr.Gicp(max_distances=(3.0, 2.0, 1.0))(scene, Pose(truth))
+    assert len(reaches) == rounds
+    assert reaches[-1] == 1.0
+
+
+def test_gicp_with_one_step_a_round_takes_every_round(courtyard_scene: tuple[Scene, np.ndarray]) -> None:
+    scene, truth = courtyard_scene
+    align, found = small_gicp.align, []
+
+    def noted(*clouds: Any, **options: Any) -> Any:
+        found.append(align(*clouds, **options))
+        return found[-1]
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(small_gicp, "align", noted)
+        hr.Gicp(iterations=1)(scene, Pose(START @ truth))
+    assert not found[0].converged
+    assert found[0].iterations == 0  # what a reader takes for rest
+    assert len(found) == 3
+
+
+def test_kiss_icp_stays_where_two_clouds_are_the_same(courtyard_scene: tuple[Scene, np.ndarray]) -> None:
+    points = courtyard_scene[0].pair.source.points
+    same = hr.VoxelGrid()(hr.Pair.of(points, points))
+    moved = hr.KissIcp()(same, Pose(np.eye(4))).T
+    assert np.linalg.norm(moved[:3, 3]) < 0.003
+    assert se3.angle_deg(moved[:3, :3]) < 0.05
+
+
+@pytest.mark.parametrize("away", [0.5, 1.3, 2.4])
+def test_kiss_icp_finds_partners_three_sigmas_away_on_a_fine_map(
+    courtyard_scene: tuple[Scene, np.ndarray], away: float
+) -> None:
+    points = courtyard_scene[0].pair.source.points
+    same = hr.VoxelGrid(voxel=0.4)(hr.Pair.of(points, points))
+    start = se3.from_rt(np.eye(3), np.array([0.8, 0.5, 0.3]) * away)
+    found = hr.KissIcp(sigma=1.0, voxel=0.5)(same, Pose(start)).T
+    assert np.linalg.norm(found[:3, 3]) < 0.02
+
+
+def test_kiss_icp_takes_a_pose_of_single_precision(courtyard_scene: tuple[Scene, np.ndarray]) -> None:
+    scene, truth = courtyard_scene
+    degrees, metres = errors(hr.KissIcp()(scene, Pose(truth.astype(np.float32))).T, truth)
+    assert degrees < 0.4
+    assert metres < 0.08
 
 
 def _asked(scene: Scene, start: Pose) -> list[int]:
