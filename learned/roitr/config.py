@@ -76,8 +76,8 @@ class RoitrConfig:
             )
         if self.transformer.blocks[:1] != ("self",):
             raise ValueError(
-                f"transformer blocks {self.transformer.blocks} must begin with 'self': a cross layer needs the position "
-                "states that a self layer makes"
+                f"transformer blocks {self.transformer.blocks} must begin with 'self': a cross layer needs the "
+                "position states that a self layer makes"
             )
 
     @property

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from dataclasses import dataclass, field
 
@@ -67,6 +68,4 @@ def rows_apart(ours: list[Tensor], theirs: list[Tensor], forgiven: int = 0) -> t
         return [math.inf] * len(ours), lonely
     difference = np.abs(tables[0] - tables[1][partner])[~alone]
     widths = np.cumsum([0, *(t[0].numel() if len(t) else 1 for t in ours)])
-    return [
-        float(difference[:, a:b].max(initial=0.0)) for a, b in zip(widths[:-1], widths[1:], strict=True)
-    ], lonely
+    return [float(difference[:, a:b].max(initial=0.0)) for a, b in itertools.pairwise(widths)], lonely
