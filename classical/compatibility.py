@@ -27,7 +27,7 @@ class Seeds(NamedTuple):
 
 
 def first_order(source: Array, target: Array, reach: float) -> Floats:
-    """``[1 - (|p_i - p_j| - |q_i - q_j|)^2 / reach^2]+`` (K, K) for matches p (K, 3), q (K, 3) in metres; diagonal 1."""
+    """``[1 - (|p_i - p_j| - |q_i - q_j|)^2 / reach^2]+`` (K, K) for matches p, q (K, 3) in metres; diagonal 1."""
     out = np.empty((len(source), len(source)), dtype=np.float32)
     for rows in _blocks(len(source)):
         change = cdist(source[rows], source) - cdist(target[rows], target)

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from hybridreg.classical.fgr import Fgr
     from hybridreg.classical.fpfh import Fpfh
     from hybridreg.classical.gicp import Gicp
+    from hybridreg.classical.hcf import Hcf
     from hybridreg.classical.icp import Icp
     from hybridreg.classical.kiss import KissMatcher
     from hybridreg.classical.kiss_icp import KissIcp
@@ -34,11 +35,13 @@ if TYPE_CHECKING:
     from hybridreg.classical.visibility import Visibility
     from hybridreg.classical.voxel import VoxelGrid
     from hybridreg.cloud import PointCloud
+    from hybridreg.learned.roitr.stage import Roitr
     from hybridreg.learned.stages.dense import DenseFeatures
     from hybridreg.learned.stages.geotransformer import GeoTransformer
     from hybridreg.learned.stages.lgr import Lgr
     from hybridreg.learned.stages.omp import Omp
     from hybridreg.learned.stages.vgam import Vgam
+    from hybridreg.learned.vrhcf.stage import Vrhcf
     from hybridreg.matches import Correspondences, Overlap, Pose
     from hybridreg.pair import LabelledPair, Pair
     from hybridreg.pipeline import Pipeline, Trace
@@ -53,6 +56,7 @@ _WHERE = {
     "hybridreg.classical.fgr": ["Fgr"],
     "hybridreg.classical.fpfh": ["Fpfh"],
     "hybridreg.classical.gicp": ["Gicp"],
+    "hybridreg.classical.hcf": ["Hcf"],
     "hybridreg.classical.icp": ["Icp"],
     "hybridreg.classical.kiss": ["KissMatcher"],
     "hybridreg.classical.kiss_icp": ["KissIcp"],
@@ -64,11 +68,13 @@ _WHERE = {
     "hybridreg.classical.visibility": ["Visibility"],
     "hybridreg.classical.voxel": ["VoxelGrid"],
     "hybridreg.cloud": ["PointCloud"],
+    "hybridreg.learned.roitr.stage": ["Roitr"],
     "hybridreg.learned.stages.dense": ["DenseFeatures"],
     "hybridreg.learned.stages.geotransformer": ["GeoTransformer"],
     "hybridreg.learned.stages.lgr": ["Lgr"],
     "hybridreg.learned.stages.omp": ["Omp"],
     "hybridreg.learned.stages.vgam": ["Vgam"],
+    "hybridreg.learned.vrhcf.stage": ["Vrhcf"],
     "hybridreg.matches": ["Correspondences", "Overlap", "Pose"],
     "hybridreg.pair": ["LabelledPair", "Pair"],
     "hybridreg.pipeline": ["Pipeline", "Trace"],

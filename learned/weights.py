@@ -56,7 +56,13 @@ def from_pretrained(name_or_folder: str | os.PathLike[str]) -> RegistrationNetwo
     """
     folder = _find(name_or_folder)
     try:
-        config = NetworkConfig.from_dict(read_json(folder / CONFIG_FILE))
+        values = read_json(folder / CONFIG_FILE)
+    except ValueError as error:
+        raise ValueError(f"{folder / CONFIG_FILE} is damaged: {error}") from error
+    if isinstance(values, dict) and "network" in values:
+        raise ValueError(f"{folder / CONFIG_FILE} is of the network {values['network']!r}, not of this one")
+    try:
+        config = NetworkConfig.from_dict(values)
     except (ValueError, TypeError, ArithmeticError) as error:
         raise ValueError(f"{folder / CONFIG_FILE} is damaged: {error}") from error
     try:

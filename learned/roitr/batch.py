@@ -44,7 +44,8 @@ def make_batch(
         Of the network that will take the batch.
     viewpoints
         Where target and source were seen from: (3,), (k, 3), or None where that is not known (normals then look
-        upwards). By default each frame's origin, as the original has it (dataset/tdmatch.py).
+        upwards). Read where ``config.facing`` is "sensor"; otherwise, and by default, normals face each frame's
+        origin, as the original has it (dataset/tdmatch.py).
     device
         Where the tensors end up; the levels are built on the CPU.
 
@@ -53,7 +54,8 @@ def make_batch(
     ValueError
         A cloud of fewer than 4 points, or one that holds values that are not finite.
     """
-    places = (np.zeros(3), np.zeros(3)) if viewpoints is None else viewpoints
+    origins = (np.zeros(3), np.zeros(3))
+    places = origins if viewpoints is None or config.facing == "origin" else viewpoints
     clouds = [
         _levels(cloud, place, config, name)
         for cloud, place, name in zip((target, source), places, ("target", "source"), strict=True)

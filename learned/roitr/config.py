@@ -41,6 +41,9 @@ class RoitrConfig:
     decoder_heads: int = 4
     interpolation: int = 3  # coarser points that a finer one is interpolated from
     normal_neighbors: int = 33  # the point itself counted
+    # Where normals look: at the origin of each cloud's frame, as released and as the published weights expect, wherever
+    # the sensor stood; or at the sensor, and upwards where its place is not known.
+    facing: Literal["origin", "sensor"] = "origin"
     max_points: int = 30_000  # of a cloud; more are thinned to so many
     fine_dim: int = 256  # width of the features that points are matched by
     transformer: TransformerConfig = field(default_factory=_transformer)
@@ -120,6 +123,7 @@ def _outdoor(voxel: float, dim: int, **fields: Any) -> RoitrConfig:
         ),
         "loss": LossConfig(log_scale=24.0, positive_radius=2.0 * voxel, targets=64),
         "occlusion_radius": 1.5 * voxel,
+        "facing": "sensor",
     }
     return RoitrConfig(voxel=voxel, fine_dim=dim, **{**plan, **fields})
 

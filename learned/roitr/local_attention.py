@@ -59,15 +59,17 @@ class LocalAttention(nn.Module):
         own = projected if centres is None else projected[centres]
         weights = self.weights(projected, own, neighbors, ppf)
         value = F.embedding(neighbors, self.value(projected)).unflatten(2, (self.heads, -1))  # (n, k, h, c)
-        attended = torch.einsum("nhk,nkhc->nhc", weights, value) + self._position_values(weights, ppf)
+        # Products and sums as they lie: einsum would copy the gathered tensors first, for half the speed.
+        attended = (weights.transpose(1, 2)[..., None] * value).sum(1) + self._position_values(weights, ppf)
         # The residual is the projected feature, not the layer's input.
         return self.out_proj(self.norm(self.linear(attended.flatten(1)) + own))
 
     def weights(self, projected: Tensor, own: Tensor, neighbors: Tensor, ppf: Tensor) -> Tensor:
         """Attention (n, h, k) of centres with projected features (n, C) to their neighbours among (M, C)."""
         query = self.query(own).unflatten(1, (self.heads, -1))  # (n, h, c)
-        key = F.embedding(neighbors, self.key(projected)).unflatten(2, (self.heads, -1))  # (n, k, h, c)
-        scores = torch.einsum("nhc,nkhc->nhk", query, key) + self._position_scores(query, ppf)
+        key = F.embedding(neighbors, self.key(projected))  # (n, k, C)
+        products = (key * query.flatten(1)[:, None]).unflatten(2, (self.heads, -1))
+        scores = products.sum(3).transpose(1, 2) + self._position_scores(query, ppf)
         return torch.softmax(scores / math.sqrt(query.shape[2]), dim=-1)
 
     def _position_scores(self, query: Tensor, ppf: Tensor) -> Tensor:

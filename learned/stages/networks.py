@@ -4,8 +4,9 @@
 from __future__ import annotations
 
 from functools import lru_cache
+from importlib import import_module
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import torch
 
@@ -15,7 +16,7 @@ from hybridreg.learned.untrained import untrained_parts
 from hybridreg.learned.weights import find_files, from_pretrained, load_official
 
 _DEFAULT_SIZE = "nano"
-_CHECKPOINTS = (".tar", ".pth", ".pt")
+_CHECKPOINTS = (".tar", ".pth", ".pt", ".pkl")
 # Networks held at a time: OMP and a matcher of other weights, each beside the one before it.
 _HELD = 4
 
@@ -27,6 +28,7 @@ class NetworkName(NamedTuple):
     size: str | None
     device: str
     image: bool  # of a network of random weights: has it OMP and VGAM?
+    network: str | None = None  # "module:Class" of an `OwnNetwork`; None is today's
 
 
 class Loaded(NamedTuple):
@@ -61,10 +63,13 @@ def _load(name: NetworkName, stamp: tuple[int, ...]) -> Loaded:
     with torch.random.fork_rng(devices=[]):
         torch.default_generator.manual_seed(0)
         network = _make(name)
-    return Loaded(network.to(name.device).eval().requires_grad_(False), untrained_parts(network))
+    untrained = network.untrained() if hasattr(network, "untrained") else untrained_parts(network)
+    return Loaded(network.to(name.device).eval().requires_grad_(False), untrained)
 
 
-def _make(name: NetworkName) -> RegistrationNetwork:
+def _make(name: NetworkName) -> Any:
+    if name.network is not None:
+        return _make_own(name)
     if name.weights is None:
         return RegistrationNetwork(named_config(name.size or _DEFAULT_SIZE, omp=name.image, vgam=name.image))
     if _is_checkpoint(name.weights):
@@ -72,6 +77,18 @@ def _make(name: NetworkName) -> RegistrationNetwork:
     if name.size is not None:
         raise ValueError(f"size={name.size!r}: the weights {name.weights!r} bring their own configuration")
     return from_pretrained(name.weights)
+
+
+def _make_own(name: NetworkName) -> Any:
+    module, _, attribute = str(name.network).partition(":")
+    cls = getattr(import_module(module), attribute)
+    if name.weights is None:
+        return cls.named(name.size or _DEFAULT_SIZE)
+    if _is_checkpoint(name.weights):
+        return cls.load_official(name.weights, name.size)
+    if name.size is not None:
+        raise ValueError(f"size={name.size!r}: the weights {name.weights!r} bring their own configuration")
+    return cls.from_pretrained(name.weights)
 
 
 def _is_checkpoint(weights: str) -> bool:

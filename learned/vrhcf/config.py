@@ -59,8 +59,8 @@ def _surface(*widths: int) -> tuple[SurfaceConv, ...]:
 class SphereNetConfig:
     """The descriptor; the defaults are the published 3DMatch one with everything as released.
 
-    Three things differ between what was released and what is right. Official weights and published numbers depend on
-    the first two, which therefore are the defaults; the sizes of our own have the right ones.
+    In four things what was released differs from what is right. Official weights and published numbers depend on
+    it, so the defaults are as released; the sizes of our own have the right ones.
 
     ``padding``
         "released": elevation wraps around and azimuth is padded with zeros, because the padding functions were written
@@ -72,6 +72,9 @@ class SphereNetConfig:
     ``matching``
         "channels" (released): descriptors are divided by the length of each *channel* over all keypoints
         (module/HCF_module.py). "unit": by their own length. See `hybridreg.learned.vrhcf.matching`.
+    ``facing``
+        "origin" (released): axes face the origin of each cloud's frame, so that a cloud whose frame was moved has other
+        descriptors. "sensor": they face the place that the cloud was seen from, and upwards where that is not known.
     """
 
     voxel: float = 0.025  # metres: spacing of the points that the network was trained with
@@ -88,6 +91,7 @@ class SphereNetConfig:
     frames: Literal["released", "right"] = "released"
     frame_batch: int = 4  # patches a batch in the released scripts
     matching: Literal["channels", "unit"] = "channels"
+    facing: Literal["origin", "sensor"] = "origin"
     positive_margin: float = 0.1
     negative_margin: float = 1.4
     loss_pairs: int = 10  # keypoint pairs of a training step
@@ -136,6 +140,7 @@ def _outdoor(voxel: float, points: int, shells: tuple[int, ...], surface: tuple[
         padding="right",
         frames="right",
         matching="unit",
+        facing="sensor",
         pair_radius=1.0 * voxel,
     )
 

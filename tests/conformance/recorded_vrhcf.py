@@ -78,14 +78,15 @@ def network_config(plan: dict[str, Any], **changes: Any) -> SphereNetConfig:
 def _descriptors(network: SphereNet, values: dict[str, Tensor], side: str, found: Found) -> None:
     patches = values[f"in.{side}_patches"]
     centred = patches - patches[:, -1:]
-    axes = reference_axes(centred, patches[:, -1])
-    found.close(f"out.{side}.z_axis", axes, values[f"out.{side}.z_axis"], TOLERANCE)
-    # On the recorded axes: the arc cosine near 1 makes a milliradian of an axis's last digit.
-    turned = upright_rotations(
-        values[f"out.{side}.z_axis"], network.config.frames, network.config.frame_batch
-    )
-    found.close(f"out.{side}.rotation", turned, values[f"out.{side}.rotation"], TOLERANCE)
-    local = centred @ values[f"out.{side}.rotation"]
+    local = centred
+    if f"out.{side}.rotation" in values:
+        axes = reference_axes(centred, patches[:, -1])
+        found.close(f"out.{side}.z_axis", axes, values[f"out.{side}.z_axis"], TOLERANCE)
+        # On the recorded axes: the arc cosine near 1 makes a milliradian of an axis's last digit.
+        axes = values[f"out.{side}.z_axis"]
+        turned = upright_rotations(axes, network.config.frames, network.config.frame_batch)
+        found.close(f"out.{side}.rotation", turned, values[f"out.{side}.rotation"], TOLERANCE)
+        local = centred @ values[f"out.{side}.rotation"]
     given = network.surface(network.voxelise(local)).amax((2, 3))
     found.close(f"out.{side}.descriptors", given, values[f"out.{side}.descriptors"], TOLERANCE)
     # From the patches alone a point may be moved by rounding of the axis; descriptors are some 2 apart.
@@ -100,7 +101,8 @@ def _steps(network: SphereNet, values: dict[str, Tensor], found: Found) -> None:
     for name in [name for name in values if name.startswith("out.src.local_points_first")]:
         count = len(values[name])
         patches = values["in.src_patches"][:count]
-        local = (patches - patches[:, -1:]) @ values["out.src.rotation"][:count]
+        local = patches - patches[:, -1:]
+        local = local @ values["out.src.rotation"][:count] if "out.src.rotation" in values else local
         found.close(name, local, values[name], TOLERANCE)
         recorded = name.replace("local_points", "spherical")
         found.close(recorded, spherical(values[name]), values[recorded], TOLERANCE)
