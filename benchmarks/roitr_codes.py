@@ -76,18 +76,17 @@ def report(config: RoitrConfig, points: int, repeats: int) -> None:
     network = RoitrNetwork(config).eval()
     rate = matrix_rate()
     ppf = LevelFeatures.of(batch.source)
-    print(
-        "level  points  width   fused   code by code   ratio   codes' share of multiply-adds   floor   apart"
-    )
+    print("level  points  width     fused  code by code  ratio  codes' share  before    floor    apart")
     for level, encoder in enumerate(network.backbone.encoder):
         rows, dim = batch.source.neighbors[level], config.widths[level]
         features = torch.randn(len(rows), dim)
         fast, slow, apart = alternate(encoder.blocks[0], features, rows, ppf.within[level], repeats)  # type: ignore[index]
         shape = (*rows.shape, config.inner[level], config.heads)
         (new, rest), (old, _) = (multiply_adds(*shape, fused=fused) for fused in (True, False))
+        shares = f"{new / (new + rest):13.0%} {old / (old + rest):7.0%}"
         print(
-            f"{level + 1:5d} {len(rows):7d} {dim:6d} {fast * 1e3:6.1f} ms {slow * 1e3:9.1f} ms {fast / slow:9.2f} "
-            f"{new / (new + rest):15.0%}, before {old / (old + rest):.0%} {(new + rest) / rate * 1e3:11.1f} ms {apart:8.0e}"
+            f"{level + 1:5d} {len(rows):7d} {dim:6d} {fast * 1e3:6.1f} ms {slow * 1e3:10.1f} ms {fast / slow:6.2f}"
+            f" {shares} {(new + rest) / rate * 1e3:5.1f} ms {apart:8.0e}"
         )
     seconds = whole(network, batch, max(1, repeats // 3))
     print(
