@@ -15,7 +15,7 @@ from hybridreg.learned.procrustes import apply_transform
 from hybridreg.learned.roitr.targets import RoitrTargets
 
 if TYPE_CHECKING:
-    from hybridreg.learned.roitr.network import RoitrNetwork, RoitrOutput
+    from hybridreg.learned.roitr.network import RoitrEncoding, RoitrNetwork, RoitrOutput
 
 
 @dataclass(frozen=True)
@@ -27,7 +27,9 @@ class RoitrLosses:
     total: Tensor  # with the configuration's weights
 
 
-def losses(network: RoitrNetwork, output: RoitrOutput, targets: RoitrTargets) -> RoitrLosses:
+def losses(
+    network: RoitrNetwork, output: RoitrOutput | RoitrEncoding, targets: RoitrTargets
+) -> RoitrLosses:
     """Losses of a training step: the fine part looks at the drawn true pairs of patches (lib/loss.py).
 
     The original's validation looks at the estimated pairs instead (`validation_losses`): the two fine losses cannot be
@@ -43,7 +45,10 @@ def validation_losses(network: RoitrNetwork, output: RoitrOutput, targets: Roitr
 
 
 def _losses(
-    network: RoitrNetwork, output: RoitrOutput, targets: RoitrTargets, nodes: tuple[Tensor, Tensor]
+    network: RoitrNetwork,
+    output: RoitrOutput | RoitrEncoding,
+    targets: RoitrTargets,
+    nodes: tuple[Tensor, Tensor],
 ) -> RoitrLosses:
     config, target, source = network.config, output.target, output.source
     overlap = targets.overlap.new_zeros(len(target.nodes), len(source.nodes))

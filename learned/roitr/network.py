@@ -6,7 +6,7 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar, Literal
+from typing import Any, ClassVar, Literal, NamedTuple
 
 import torch
 from torch import Tensor, nn
@@ -30,6 +30,13 @@ from hybridreg.learned.roitr.official_names import official_name, unused_names
 from hybridreg.learned.roitr.targets import RoitrTargets
 from hybridreg.learned.sinkhorn import OptimalTransport
 from hybridreg.learned.superpoint_matching import SuperpointMatches, match_superpoints
+
+
+class RoitrEncoding(NamedTuple):
+    """A pair after both transformers: all that a training step needs."""
+
+    target: CloudEncoding
+    source: CloudEncoding
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -114,15 +121,15 @@ class RoitrNetwork(OwnNetwork):
         matches = self.match_points(target, source, superpoints)
         return RoitrOutput(target=target, source=source, superpoints=superpoints, matches=matches)
 
-    def losses(self, output: RoitrOutput, targets: RoitrTargets) -> RoitrLosses:
-        """The training losses of an output (`hybridreg.learned.roitr.losses.losses`)."""
+    def losses(self, output: RoitrOutput | RoitrEncoding, targets: RoitrTargets) -> RoitrLosses:
+        """The training losses of an output, or of `encode`'s: the matches take no part in them."""
         return losses(self, output, targets)
 
     def memory(self, batch: RoitrBatch) -> int:
         """Predicted peak of a forward pass in bytes, beside what the process and the batch hold already."""
         return forward_bytes(batch, self.config)
 
-    def encode(self, batch: RoitrBatch) -> tuple[CloudEncoding, CloudEncoding]:
+    def encode(self, batch: RoitrBatch) -> RoitrEncoding:
         """Target and source with unit superpoint features, fine features and patches."""
         levels = (batch.source, batch.target)
         coarse, fine = zip(*(self.backbone(cloud) for cloud in levels), strict=True)
@@ -130,7 +137,7 @@ class RoitrNetwork(OwnNetwork):
         source, target = (
             self._cloud(*parts) for parts in zip(levels, mixed, (fine[0], fine[1]), strict=True)
         )
-        return target, source
+        return RoitrEncoding(target, source)
 
     def _cloud(self, levels: Levels, mixed: Tensor, fine: Tensor) -> CloudEncoding:
         points, nodes = levels.points[0], levels.points[-1]

@@ -25,7 +25,9 @@ class Found:
 
     def close(self, name: str, value: Tensor, want: Tensor, tolerance: float) -> None:
         """Largest absolute difference; infinity where the shapes differ."""
-        self.values[name] = (apart(value, want), tolerance)
+        # A tolerance that grows with the recorded numbers is none where these are not finite.
+        finite = math.isfinite(tolerance)
+        self.values[name] = (apart(value, want) if finite else math.inf, tolerance if finite else 0.0)
 
     def same(self, name: str, value: Tensor, want: Tensor) -> None:
         """Equal to the last bit."""
