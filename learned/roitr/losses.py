@@ -27,9 +27,7 @@ class RoitrLosses:
     total: Tensor  # with the configuration's weights
 
 
-def losses(
-    network: RoitrNetwork, output: RoitrOutput | RoitrEncoding, targets: RoitrTargets
-) -> RoitrLosses:
+def losses(network: RoitrNetwork, output: RoitrOutput | RoitrEncoding, targets: RoitrTargets) -> RoitrLosses:
     """Losses of a training step: the fine part looks at the drawn true pairs of patches (lib/loss.py).
 
     The original's validation looks at the estimated pairs instead (`validation_losses`): the two fine losses cannot be
