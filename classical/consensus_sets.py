@@ -30,8 +30,8 @@ def first_sets(agreement: Floats, size: int) -> Rows:
     """The ``size`` matches (S, size) that agree best with each seed, from (S, K); 4 where there are not so many."""
     size = size if agreement.shape[1] >= size else min(_SMALL, agreement.shape[1])
     # Whole numbers sort by counting; of equals the first.
-    kind = np.int16 if agreement.max(initial=0.0) < np.iinfo(np.int16).max else np.int32
-    return np.argsort(-agreement.astype(kind), axis=1, kind="stable")[:, :size]
+    short = agreement.max(initial=0.0) < np.iinfo(np.int16).max
+    return np.argsort((-agreement).astype(np.int16 if short else np.int32), axis=1, kind="stable")[:, :size]
 
 
 def filter_sets(soft: Floats, sets: Rows, share: float, final: int) -> list[Filtered]:

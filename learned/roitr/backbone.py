@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import cast
 
 import torch
 from torch import Tensor, nn
@@ -89,7 +90,7 @@ class DecoderLevel(nn.Module):
 
     def __init__(self, dim: int, coarse_dim: int | None, hidden: int, heads: int) -> None:
         super().__init__()
-        self.up = Head(dim) if coarse_dim is None else StepUp(dim, coarse_dim)
+        self.up: Head | StepUp = Head(dim) if coarse_dim is None else StepUp(dim, coarse_dim)
         self.block = LocalBlock(dim, hidden, heads)
 
 
@@ -100,13 +101,15 @@ class RoitrBackbone(nn.Module):
         super().__init__()
         before = (1, *config.widths[:-1])
         self.encoder = nn.ModuleList(
-            EncoderLevel(*plan, config.heads, blocks)
-            for *plan, blocks in zip(before, config.widths, config.inner, config.blocks, strict=True)
+            EncoderLevel(in_dim, dim, hidden, config.heads, blocks)
+            for in_dim, dim, hidden, blocks in zip(
+                before, config.widths, config.inner, config.blocks, strict=True
+            )
         )
         above = (*config.widths[1:], None)
         self.decoder = nn.ModuleList(
-            DecoderLevel(*plan, config.decoder_heads)
-            for plan in zip(config.widths, above, config.inner, strict=True)
+            DecoderLevel(dim, coarse_dim, hidden, config.decoder_heads)
+            for dim, coarse_dim, hidden in zip(config.widths, above, config.inner, strict=True)
         )
 
     def forward(self, levels: Levels) -> tuple[Tensor, Tensor]:
@@ -121,13 +124,13 @@ class RoitrBackbone(nn.Module):
         encoded: list[Tensor] = []
         for level in range(len(self.encoder)):
             features = self.abstract(level, features, levels, ppf)
-            features = self.encoder[level].refine(features, levels.neighbors[level], ppf.within[level])
+            features = self._encoder(level).refine(features, levels.neighbors[level], ppf.within[level])
             encoded.append(features)
         return encoded
 
     def abstract(self, level: int, finer: Tensor, levels: Levels, ppf: LevelFeatures) -> Tensor:
         """The abstraction layer of a level alone, from the finer level's features; level 0 begins with one too."""
-        layer = self.encoder[level].abstraction
+        layer = self._encoder(level).abstraction
         if level == 0:
             return layer(finer, None, levels.neighbors[0], ppf.within[0])
         return layer(finer, levels.picked[level - 1], levels.down[level - 1], ppf.down[level - 1])
@@ -137,13 +140,19 @@ class RoitrBackbone(nn.Module):
         features = None
         for level in reversed(range(len(self.decoder))):
             features = self.step_up(level, encoded[level], features, levels)
-            features = self.decoder[level].block(features, levels.neighbors[level], ppf.within[level])
+            features = self._decoder(level).block(features, levels.neighbors[level], ppf.within[level])
         assert features is not None
         return features
 
     def step_up(self, level: int, encoded: Tensor, coarse: Tensor | None, levels: Levels) -> Tensor:
         """The decoder's way up to a level, before its attention block."""
-        up = self.decoder[level].up
+        up = self._decoder(level).up
         if coarse is None:
             return up(encoded)
         return up(encoded, coarse, levels.up[level], levels.up_distance[level])
+
+    def _encoder(self, level: int) -> EncoderLevel:
+        return cast(EncoderLevel, self.encoder[level])
+
+    def _decoder(self, level: int) -> DecoderLevel:
+        return cast(DecoderLevel, self.decoder[level])

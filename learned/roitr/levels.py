@@ -3,7 +3,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import torch
@@ -105,5 +107,5 @@ def _nearest(tree: cKDTree, queries: NDArray[np.floating], k: int) -> tuple[NDAr
     return np.asarray(distance).reshape(shape), np.asarray(rows, dtype=np.int64).reshape(shape)
 
 
-def _tensors(arrays: list[NDArray[np.generic]]) -> tuple[Tensor, ...]:
+def _tensors(arrays: Sequence[NDArray[Any]]) -> tuple[Tensor, ...]:
     return tuple(torch.from_numpy(np.ascontiguousarray(array)) for array in arrays)

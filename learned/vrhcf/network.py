@@ -92,7 +92,7 @@ class SphereNet(OwnNetwork):
     def __init__(self, config: SphereNetConfig) -> None:
         super().__init__()
         self.config = config
-        plans = (*config.shells, *config.surface)
+        plans: list[ShellConv | SurfaceConv] = [*config.shells, *config.surface]
         widths = (1, *(plan.width for plan in plans))
         wraps = config.padding == "right"
         self.layers = nn.ModuleList(
@@ -142,9 +142,9 @@ class SphereNet(OwnNetwork):
 
     def untrained(self) -> frozenset[str]:
         """Its norms have no parameters: the statistics that they keep tell whether any batch came by."""
-        norms = [m for m in self.modules() if isinstance(m, (nn.BatchNorm2d, nn.BatchNorm3d))]
-        fresh = all(bool((n.running_mean == 0).all() and (n.running_var == 1).all()) for n in norms)
-        return frozenset({"layers"}) if norms and fresh else frozenset()
+        kept = {name: t for name, t in self.named_buffers() if name.endswith(("running_mean", "running_var"))}
+        fresh = all(bool(t.eq(1.0 if name.endswith("var") else 0.0).all()) for name, t in kept.items())
+        return frozenset({"layers"}) if kept and fresh else frozenset()
 
     def forward(self, batch: SphereBatch) -> SphereOutput:
         """Descriptors of all patches of a pair: the source's first, as batch norm notices in training."""

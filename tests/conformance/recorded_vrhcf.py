@@ -159,6 +159,8 @@ def _loss(plan: dict[str, Any], first: Tensor, second: Tensor) -> SphereLosses:
 def _matching(values: dict[str, Tensor], found: Found) -> None:
     raw = [values[f"out.{side}.descriptors"] for side in ("src", "tgt")]
     for name, pair in (("raw", raw), ("unit", [F.normalize(d, dim=1) for d in raw])):
+        if f"match.out.{name}" not in values:
+            continue
         own, want = match_descriptors(pair[0], pair[1], "channels"), values[f"match.out.{name}"]
         source, target = (d / (d.norm(dim=0, keepdim=True) + 1e-6) for d in pair)
         gaps = ((source * target[own]).sum(1) - (source * target[want]).sum(1)).abs()

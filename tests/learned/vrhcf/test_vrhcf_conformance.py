@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import shutil
 from pathlib import Path
 
 import numpy as np
@@ -28,7 +27,14 @@ def test_every_output_agrees(stem: Path) -> None:
 def test_what_is_altered_is_noticed(stem: Path, tmp_path: Path) -> None:
     from recorded_vrhcf import compare
 
-    shutil.copy(stem.with_name(f"{stem.name}.npz"), tmp_path / "changed.npz")
+    # A part of the patches tells as much; what hangs on all of them is left out.
+    values = dict(np.load(stem.with_name(f"{stem.name}.npz")))
+    values = {
+        n: a[:40] if a.shape[:1] == (256,) else a
+        for n, a in values.items()
+        if "first64" not in n or "hcf" in n
+    }
+    np.savez(tmp_path / "changed.npz", **{n: a for n, a in values.items() if not n.startswith("match.")})
     weights = dict(np.load(stem.with_name(f"{stem.name}_weights.npz")))
     weights["w.conv_net.ops.21.weight"] = weights["w.conv_net.ops.21.weight"] + np.float32(0.01)
     np.savez(tmp_path / "changed_weights.npz", **weights)

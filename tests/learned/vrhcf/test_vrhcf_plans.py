@@ -207,7 +207,6 @@ def _estimates(stage: Any) -> Values:
             (7, 12, 5),
             [[2, 5], [3, 3]],
             [layer(6, 2, 1), layer(4, 5, 1, norm=False, relu=False)],
-            interpolation=False,
         ),
         plan((3, 10, 4), [[4, 3]], [layer(3, 3, 4, norm=False, relu=False)], local_frame="KITTI", batch=2),
     ],
