@@ -153,15 +153,24 @@ def _targets(
         apart(calm, want) if not wrong.any() else float("inf"),
         MODULE,
     )
-    shares = visible_shares(
-        (target.points, source.points),
-        (target.patches, source.patches),
-        values["in.transform"],
-        config.occlusion_radius,
-    )
-    for side, share in zip(("tgt", "src"), shares, strict=True):
-        found.close(f"out.gt_{side}_node_occ", share, values[f"out.gt_{side}_node_occ"], MODULE)
+    _shares(recording, target, source, found)
     return targets
+
+
+def _shares(recording: RoitrRecording, target: CloudEncoding, source: CloudEncoding, found: Found) -> None:
+    # A point whose nearest one lies at the radius may count or not: between both shares everything is right.
+    clouds = (target.points, source.points), (target.patches, source.patches)
+    low, own, high = (
+        visible_shares(*clouds, recording.values["in.transform"], recording.config.occlusion_radius + by)
+        for by in (-_RADIUS_TIE, 0.0, _RADIUS_TIE)
+    )
+    for i, side in enumerate(("tgt", "src")):
+        name = f"out.gt_{side}_node_occ"
+        want = recording.values[name]
+        tied = (low[i] != high[i]) & (want >= low[i] - MODULE) & (want <= high[i] + MODULE)
+        if bool((tied & ((own[i] - want).abs() > MODULE)).any()):
+            found.ties[name] = int(tied.sum())
+        found.close(name, torch.where(tied, want, own[i]), want, MODULE)
 
 
 def _radius_ties(target: CloudEncoding, source: CloudEncoding, transform: Tensor, radius: float) -> Tensor:
