@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from hybridreg.classical.fgr import Fgr
     from hybridreg.classical.fpfh import Fpfh
     from hybridreg.classical.gicp import Gicp
+    from hybridreg.classical.hcf import Hcf
     from hybridreg.classical.icp import Icp
     from hybridreg.classical.kiss import KissMatcher
     from hybridreg.classical.kiss_icp import KissIcp
@@ -36,11 +37,13 @@ if TYPE_CHECKING:
     from hybridreg.cloud import PointCloud
     from hybridreg.learned.fcgf.stage import Fcgf
     from hybridreg.learned.omnet.stage import OmNet
+    from hybridreg.learned.roitr.stage import Roitr
     from hybridreg.learned.stages.dense import DenseFeatures
     from hybridreg.learned.stages.geotransformer import GeoTransformer
     from hybridreg.learned.stages.lgr import Lgr
     from hybridreg.learned.stages.omp import Omp
     from hybridreg.learned.stages.vgam import Vgam
+    from hybridreg.learned.vrhcf.stage import Vrhcf
     from hybridreg.matches import Correspondences, Overlap, Pose
     from hybridreg.pair import LabelledPair, Pair
     from hybridreg.pipeline import Pipeline, Trace
@@ -55,6 +58,7 @@ _WHERE = {
     "hybridreg.classical.fgr": ["Fgr"],
     "hybridreg.classical.fpfh": ["Fpfh"],
     "hybridreg.classical.gicp": ["Gicp"],
+    "hybridreg.classical.hcf": ["Hcf"],
     "hybridreg.classical.icp": ["Icp"],
     "hybridreg.classical.kiss": ["KissMatcher"],
     "hybridreg.classical.kiss_icp": ["KissIcp"],
@@ -68,11 +72,13 @@ _WHERE = {
     "hybridreg.cloud": ["PointCloud"],
     "hybridreg.learned.fcgf.stage": ["Fcgf"],
     "hybridreg.learned.omnet.stage": ["OmNet"],
+    "hybridreg.learned.roitr.stage": ["Roitr"],
     "hybridreg.learned.stages.dense": ["DenseFeatures"],
     "hybridreg.learned.stages.geotransformer": ["GeoTransformer"],
     "hybridreg.learned.stages.lgr": ["Lgr"],
     "hybridreg.learned.stages.omp": ["Omp"],
     "hybridreg.learned.stages.vgam": ["Vgam"],
+    "hybridreg.learned.vrhcf.stage": ["Vrhcf"],
     "hybridreg.matches": ["Correspondences", "Overlap", "Pose"],
     "hybridreg.pair": ["LabelledPair", "Pair"],
     "hybridreg.pipeline": ["Pipeline", "Trace"],
