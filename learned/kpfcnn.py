@@ -37,9 +37,9 @@ class KpfcnnEncoder(nn.Module):
         for block, module in zip(self.config.encoder(), self.blocks, strict=True):
             if block.plan.strided:
                 skips.append(features)
-                plain, around = None, strided_surroundings(pyramid, block.stage)
+                plain, around = None, strided_surroundings(pyramid, block.stage, exact=True)
             else:
-                plain = around = plain or plain_surroundings(pyramid, block.stage)
+                plain = around = plain or plain_surroundings(pyramid, block.stage, exact=True)
             features = module(features, around)
         return features, skips
 
