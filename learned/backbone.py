@@ -80,7 +80,9 @@ class KpconvFpn(nn.Module):
             plain = _with_influence(plain, blocks[-1])
         for index, block in enumerate(blocks):
             strided = stage > 0 and index == 0
-            features = block(features, strided_surroundings(pyramid, stage, cylindrical) if strided else plain)
+            features = block(
+                features, strided_surroundings(pyramid, stage, cylindrical) if strided else plain
+            )
         return features
 
 

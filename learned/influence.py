@@ -23,7 +23,9 @@ class Links:
     query: Tensor  # (E,) int64
     support: Tensor  # (E,) int64
     local: Tensor  # (4, E): support minus query in metres, and its squared length
-    exact: bool = False  # subtract kernel points before squaring: a quarter of the rounding, for a little more time
+    exact: bool = (
+        False  # subtract kernel points before squaring: a quarter of the rounding, for a little more time
+    )
 
     def influence(self, kernel: Tensor, sigma: float) -> Influence:
         """Of every neighbour on every kernel point (K, 3) metres: ``max(0, 1 - |y_j - q_i - x_k| / sigma)``."""
@@ -125,7 +127,9 @@ def _reached(links: Links, factor: Tensor, constant: float, sigma: float) -> Bag
     squared = factor @ links.local
     entry = _positions(squared, sigma**2 - constant)
     if links.exact:
-        distance = (links.local[:3].index_select(1, entry) + factor[:3, None] / 2.0).norm(dim=0).clamp_max_(sigma)
+        distance = (
+            (links.local[:3].index_select(1, entry) + factor[:3, None] / 2.0).norm(dim=0).clamp_max_(sigma)
+        )
     else:
         distance = (squared.index_select(0, entry) + constant).clamp_min_(0.0).sqrt_()
     counts = torch.bincount(links.query.index_select(0, entry), minlength=links.n_queries)

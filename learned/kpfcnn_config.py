@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Literal, NamedTuple
 
 from hybridreg import limits
@@ -69,8 +70,10 @@ class KpfcnnConfig:
     def _check_decoder(self) -> None:
         decoding, ups = self.decoding, self.decoding.count("nearest_upsample")
         if ups != self.stages - 1:
-            raise ValueError(f"{ups} nearest_upsample for {self.stages - 1} strided blocks: give one for each")
-        alone = any(pair == ("nearest_upsample",) * 2 for pair in zip(decoding, decoding[1:], strict=False))
+            raise ValueError(
+                f"{ups} nearest_upsample for {self.stages - 1} strided blocks: give one for each"
+            )
+        alone = any(pair == ("nearest_upsample",) * 2 for pair in pairwise(decoding))
         if alone or decoding[-1] != "last_unary" or decoding.count("last_unary") != 1:
             raise ValueError(
                 f"blocks end in {list(decoding)}: each nearest_upsample wants a unary after it, and the last block "

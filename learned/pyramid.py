@@ -67,9 +67,7 @@ class Pyramid:
         return target, source
 
 
-def build_pyramid(
-    target: Tensor, source: Tensor, config: PyramidPlan, *, subsample: bool = False
-) -> Pyramid:
+def build_pyramid(target: Tensor, source: Tensor, config: PyramidPlan, *, subsample: bool = False) -> Pyramid:
     """Subsample both clouds stage by stage and search all neighbours.
 
     Parameters

@@ -20,9 +20,7 @@ class PairTransformer(nn.Module):
 
     def forward(self, clouds: Clouds, masks: Masks = (None, None)) -> Clouds:
         """Features (..., n, d), (..., m, d) of source and target, of which ``masks`` may leave rows out."""
-        for clouds in self.steps(clouds, masks):
-            pass
-        return clouds
+        return list(self.steps(clouds, masks))[-1]
 
     def steps(self, clouds: Clouds, masks: Masks = (None, None)) -> Iterator[Clouds]:
         """Features after each block, and after the projection."""

@@ -64,7 +64,7 @@ class CofinetConfig:
     normalisation, and in deciding which training point has no partner. "masked" is the right one: they take no part.
 
     ``patch_rule`` says which points of a superpoint make up a patch that overflows: "nearest" to it, or the "first" as
-    they are numbered. The released code overwrites places at random, seeded by the clock, so that no run equals another.
+    they are numbered. The released code overwrites places at random, seeded by the clock: no run equals another.
     """
 
     backbone: KpfcnnConfig = field(
@@ -74,7 +74,9 @@ class CofinetConfig:
     heads: int = 4
     fine_heads: int = 4
     sinkhorn_iterations: int = 100
-    sinkhorn_form: Literal["log", "kernel"] = "kernel"  # of superpoints at inference; training uses the log form
+    sinkhorn_form: Literal["log", "kernel"] = (
+        "kernel"  # of superpoints at inference; training uses the log form
+    )
     patch_points: int = 32  # at inference
     patch_rule: Literal["nearest", "first"] = "nearest"
     padding: Literal["masked", "point0"] = "masked"
@@ -107,7 +109,9 @@ class CofinetConfig:
     @staticmethod
     def from_dict(values: Mapping[str, Any]) -> CofinetConfig:
         """Build from plain values; an unknown key raises ``ValueError`` that names it."""
-        return build(CofinetConfig, {key: value for key, value in values.items() if key != "network"}, "config")
+        return build(
+            CofinetConfig, {key: value for key, value in values.items() if key != "network"}, "config"
+        )
 
 
 def _loss(voxel: float, **changes: Any) -> CofinetLossConfig:

@@ -49,7 +49,9 @@ class CofinetEncoding:
 
     target: CofinetCloud
     source: CofinetCloud
-    log_assignment: Tensor  # (n + 1, m + 1) of source and target superpoints, the last row and column the slack
+    log_assignment: (
+        Tensor  # (n + 1, m + 1) of source and target superpoints, the last row and column the slack
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -133,9 +135,17 @@ class CofinetNetwork(Pretrained, nn.Module):
         )
         return source, target
 
-    def match_points(self, encoding: CofinetEncoding, nodes: NodePairs) -> PointMatches:
-        """Points of paired patches that are the best of their row or their column."""
-        source, target = self.patches(encoding)
+    def match_points(
+        self,
+        encoding: CofinetEncoding,
+        nodes: NodePairs,
+        patches: tuple[PatchIndex, PatchIndex] | None = None,
+    ) -> PointMatches:
+        """Points of paired patches that are the best of their row or their column.
+
+        ``patches`` of source and target are those of `patches` unless given.
+        """
+        source, target = patches or self.patches(encoding)
         found = []
         for chunk in torch.arange(len(nodes.source), device=nodes.source.device).split(_CHUNK):
             sides = (source.take(nodes.source[chunk]), target.take(nodes.target[chunk]))

@@ -34,10 +34,10 @@ class PatchIndex(NamedTuple):
         return PatchIndex(self.index[patches], self.mask[patches])
 
 
-def patch_index(
-    points: Tensor, nodes: Tensor, size: int, rule: Literal["nearest", "first"]
-) -> PatchIndex:
+def patch_index(points: Tensor, nodes: Tensor, size: int, rule: Literal["nearest", "first"]) -> PatchIndex:
     """Patches of ``size`` places of the points (N, 3) of each superpoint (n, 3); ``rule`` as `build_patches`."""
     patches = build_patches(points, nodes, size, rule)
     missing = size - patches.index.shape[1]
-    return PatchIndex(F.pad(patches.index, (0, missing), value=len(points)), F.pad(patches.mask, (0, missing)))
+    return PatchIndex(
+        F.pad(patches.index, (0, missing), value=len(points)), F.pad(patches.mask, (0, missing))
+    )

@@ -28,9 +28,7 @@ class CofinetTargets:
 
     def to(self, device: torch.device | str) -> CofinetTargets:
         """The same targets on another device."""
-        source, target = (
-            PatchIndex(each.index.to(device), each.mask.to(device)) for each in self.patches
-        )
+        source, target = (PatchIndex(each.index.to(device), each.mask.to(device)) for each in self.patches)
         moved = {name: getattr(self, name).to(device) for name in ("coarse", "drawn", "fine")}
         return replace(self, **moved, patches=(source, target))
 

@@ -26,7 +26,7 @@ def alternating_sinkhorn(scores: Tensor, iterations: int) -> Tensor:
 
 
 def either_best(assignment: Tensor) -> Tensor:
-    """Which entries (B, n, m) of (B, n + 1, m + 1) are the best of their row or of their column, the slack among them."""
+    """Which of the entries (B, n, m) of (B, n + 1, m + 1) are the best of their row or column, the slack's included."""
     found = torch.zeros_like(assignment, dtype=torch.bool)
     by_row = found.scatter(2, assignment.argmax(2, keepdim=True), True)
     by_column = found.scatter(1, assignment.argmax(1, keepdim=True), True)

@@ -64,9 +64,7 @@ class PredatorLossConfig:
         limits.positive(
             self, "log_scale", "positive_radius", "safe_radius", "overlap_radius", "matchability_radius"
         )
-        limits.within(
-            self, 0.0, 1e6, "positive_slack", "circle_weight", "overlap_weight", "saliency_weight"
-        )
+        limits.within(self, 0.0, 1e6, "positive_slack", "circle_weight", "overlap_weight", "saliency_weight")
         limits.at_least(self, 1, "max_points")
 
 
@@ -86,7 +84,9 @@ class PredatorConfig:
         limits.within(self, 1, _WIDEST, "final_dim")
         limits.within(self, 1e-6, 1e6, "temperature_floor")
         if self.decoder_dim >> (self.backbone.stages - 1) < 1:
-            raise ValueError(f"a graph dim of {self.graph.dim} is too narrow for {self.backbone.stages} stages")
+            raise ValueError(
+                f"a graph dim of {self.graph.dim} is too narrow for {self.backbone.stages} stages"
+            )
 
     @property
     def decoder_dim(self) -> int:
@@ -104,7 +104,9 @@ class PredatorConfig:
     @staticmethod
     def from_dict(values: Mapping[str, Any]) -> PredatorConfig:
         """Build from plain values; an unknown key raises ``ValueError`` that names it."""
-        return build(PredatorConfig, {key: value for key, value in values.items() if key != "network"}, "config")
+        return build(
+            PredatorConfig, {key: value for key, value in values.items() if key != "network"}, "config"
+        )
 
 
 def _indoor() -> PredatorConfig:

@@ -78,9 +78,7 @@ class GraphNetwork(nn.Module):
 
     def forward(self, clouds: Clouds, points: Clouds) -> Clouds:
         """Features (n, C), (m, C) and points (n, 3), (m, 3) of source and target."""
-        for clouds in self.steps(clouds, points):
-            pass
-        return clouds
+        return [clouds, *self.steps(clouds, points)][-1]
 
     def steps(self, clouds: Clouds, points: Clouds) -> Iterator[Clouds]:
         """Features of both clouds after each block."""

@@ -135,7 +135,9 @@ def matchable(
         (n,), (m,) bool.
     """
     if len(rows[0]) == 0 or len(rows[1]) == 0:
-        return rows[0].new_zeros(len(rows[0]), dtype=torch.bool), rows[1].new_zeros(len(rows[1]), dtype=torch.bool)
+        return rows[0].new_zeros(len(rows[0]), dtype=torch.bool), rows[1].new_zeros(
+            len(rows[1]), dtype=torch.bool
+        )
     likeness = features[0].detach()[rows[0]] @ features[1].detach()[rows[1]].t()
     source, target = points[0][rows[0]], points[1][rows[1]]
     to_target = (source - target[likeness.argmax(1)]).norm(dim=1)

@@ -14,7 +14,6 @@ from torch.nn import functional as F
 from hybridreg.learned.batch import Batch
 from hybridreg.learned.kpfcnn import KpfcnnDecoder, KpfcnnEncoder
 from hybridreg.learned.kpfcnn_names import load_stacked
-from hybridreg.learned.message_attention import Clouds
 from hybridreg.learned.predator.config import PredatorConfig, named_config
 from hybridreg.learned.predator.graph import GraphNetwork
 from hybridreg.learned.predator.losses import PredatorLosses, predator_losses
@@ -121,7 +120,10 @@ class PredatorNetwork(Pretrained, nn.Module):
         rows = [each.split(list(pyramid.lengths[0])) for each in (features, scores)]
         target, source = (
             PredatorCloud(
-                points=cloud, features=rows[0][side], overlap=rows[1][side][:, 0], saliency=rows[1][side][:, 1]
+                points=cloud,
+                features=rows[0][side],
+                overlap=rows[1][side][:, 0],
+                saliency=rows[1][side][:, 1],
             )
             for side, cloud in enumerate(pyramid.clouds(0))
         )
@@ -129,9 +131,7 @@ class PredatorNetwork(Pretrained, nn.Module):
 
     def losses(self, output: PredatorOutput, targets: PredatorTargets) -> PredatorLosses:
         """The three losses of a pair, and how good the answers are."""
-        return predator_losses(
-            (output.target, output.source), targets, self.config.loss
-        )
+        return predator_losses((output.target, output.source), targets, self.config.loss)
 
     def memory(self, batch: Batch) -> int:
         """Predicted peak of a forward pass in bytes, beside what the process and the batch hold already."""

@@ -119,7 +119,9 @@ def _recorded_pairs(recording: Recording, output: Output) -> SuperpointMatches:
     return found if same else SuperpointMatches(target, source, torch.ones(len(target)))
 
 
-def _targets(targets: Targets, want: dict[str, Tensor], at_radius: dict[tuple[int, int], float]) -> dict[str, float]:
+def _targets(
+    targets: Targets, want: dict[str, Tensor], at_radius: dict[tuple[int, int], float]
+) -> dict[str, float]:
     """Pairs in one truth alone, and largest difference of the overlaps, but for what points at the radius explain."""
     recorded = _overlaps(want["out.gt_node_corr_indices"], want["out.gt_node_corr_overlaps"])
     ours = _overlaps(torch.stack([targets.target, targets.source], 1), targets.overlap)

@@ -144,7 +144,9 @@ def share_apart(value: Tensor, want: Tensor) -> float:
     return float((difference / want.reshape(-1).double().abs().clamp_min(_NO_GRADIENT)).max())
 
 
-def gradients_apart(network: nn.Module, names: Mapping[str, str], want: Mapping[str, Tensor], prefix: str) -> Found:
+def gradients_apart(
+    network: nn.Module, names: Mapping[str, str], want: Mapping[str, Tensor], prefix: str
+) -> Found:
     """Single gradients ``<prefix>grad.NAME`` against the recording: 1e-4, or 1 % where a convolution is passed.
 
     ``names`` has the original's name for each of ours.
@@ -181,4 +183,4 @@ def norms_apart(
 def complete(found: Found, want: Mapping[str, Tensor], inputs: tuple[str, ...]) -> Found:
     """With an infinite difference for every recorded output that nobody compared; ``inputs`` begin what is none."""
     missed = {key for key in want if key not in found and not key.startswith(inputs)}
-    return {**found, **{key: (math.inf, 0.0) for key in sorted(missed)}}
+    return {**found, **dict.fromkeys(sorted(missed), (math.inf, 0.0))}

@@ -180,7 +180,9 @@ def test_other_plans(tmp_path: Path, description: dict) -> None:  # type: ignore
     assert main([str(tmp_path / "made")]) == 1
 
 
-def test_points_at_the_radius_are_forgiven_and_counted(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_points_at_the_radius_are_forgiven_and_counted(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     from compare import pairs_at_radius
     from plan import read_recording
     from run import main
