@@ -194,12 +194,13 @@ class CofinetNetwork(Pretrained, nn.Module):
 
     def untrained(self) -> frozenset[str]:
         """All parts where no training step has touched the network: it has no normalisation weights to tell."""
-        made = float(self.bin_score) == 1.0
+        bias = next(bias for name, bias in self.coarse.named_parameters() if name.endswith("squeeze.bias"))
+        made = bool((bias == 0).all())
         return frozenset(name for name, _ in self.named_children()) if made else frozenset()
 
     @classmethod
     def load_official(
-        cls, path: str | os.PathLike[str], config: CofinetConfig | str = "cofinet-kitti"
+        cls, path: str | os.PathLike[str], config: CofinetConfig | str | None = None
     ) -> CofinetNetwork:
         """The network of a published checkpoint, in evaluation mode.
 
@@ -208,7 +209,8 @@ class CofinetNetwork(Pretrained, nn.Module):
         path
             A ``.pth`` as published, or a bare state dict saved by ``torch.save``. Read with ``weights_only``.
         config
-            A configuration or its name. The published weights need ``padding="point0"``, which ``cofinet-kitti`` has.
+            A configuration or its name, by default ``cofinet-kitti``. Published weights need ``padding="point0"``,
+            which that one has.
 
         Raises
         ------
@@ -216,6 +218,7 @@ class CofinetNetwork(Pretrained, nn.Module):
             No such file; not a checkpoint of this network, with the wrong tensor named.
         """
         tensors = read_checkpoint(path).tensors
+        config = config or "cofinet-kitti"
         network = cls(named_config(config) if isinstance(config, str) else config)
         load_stacked(network, tensors, str(path), official_name, UNUSED)
         return network.eval()

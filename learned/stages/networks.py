@@ -64,7 +64,8 @@ def _load(name: NetworkName, stamp: tuple[int, ...]) -> Loaded:
     with torch.random.fork_rng(devices=[]):
         torch.default_generator.manual_seed(0)
         network = _make(name)
-    return Loaded(network.to(name.device).eval().requires_grad_(False), untrained_parts(network))
+    untrained = network.untrained() if hasattr(network, "untrained") else untrained_parts(network)
+    return Loaded(network.to(name.device).eval().requires_grad_(False), untrained)
 
 
 def _make(name: NetworkName) -> Any:
