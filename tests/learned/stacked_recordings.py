@@ -58,7 +58,10 @@ def inputs(pyramid: Pyramid, pairs: tuple[Tensor, Tensor]) -> dict[str, Tensor]:
 
     target, source = pyramid.clouds(0)
     found = {"in.src_points": source, "in.ref_points": target}
-    found |= {"in.transform": torch.from_numpy(TRUTH).float(), "in.correspondences": torch.stack(pairs, 1).int()}
+    found |= {
+        "in.transform": torch.from_numpy(TRUTH).float(),
+        "in.correspondences": torch.stack(pairs, 1).int(),
+    }
     for stage in range(pyramid.stages):
         found[f"in.points.{stage}"] = rows(pyramid.points[stage], stage)
         found[f"in.lengths.{stage}"] = torch.tensor(lengths[stage], dtype=torch.int32)
@@ -82,7 +85,9 @@ def unsettle(network: nn.Module) -> None:
             parameter += 0.05 * torch.randn_like(parameter)
 
 
-def gradients(network: nn.Module, naming: Callable[[str], str], recorded: list[str], prefix: str) -> dict[str, Tensor]:
+def gradients(
+    network: nn.Module, naming: Callable[[str], str], recorded: list[str], prefix: str
+) -> dict[str, Tensor]:
     """Norms of all gradients in an order, and one gradient of each kind."""
     named = {naming(name): parameter.grad for name, parameter in network.named_parameters()}
     norms = [torch.zeros(()) if named.get(name) is None else named[name].norm() for name in recorded]  # type: ignore[union-attr]
@@ -91,10 +96,14 @@ def gradients(network: nn.Module, naming: Callable[[str], str], recorded: list[s
     return found | {f"{prefix}grad_norm": torch.stack(norms)}
 
 
-def write(stem: Path, plan: Mapping[str, Any], values: Mapping[str, Tensor], weights: Mapping[str, Tensor]) -> None:
+def write(
+    stem: Path, plan: Mapping[str, Any], values: Mapping[str, Tensor], weights: Mapping[str, Tensor]
+) -> None:
     """The three files of a recording; layers that are 1x1 convolutions in the originals are written as such."""
     stem.with_name(f"{stem.name}.json").write_text(json.dumps(plan))
-    np.savez(stem.with_name(f"{stem.name}.npz"), **{name: value.detach().numpy() for name, value in values.items()})
+    np.savez(
+        stem.with_name(f"{stem.name}.npz"), **{name: value.detach().numpy() for name, value in values.items()}
+    )
     np.savez(
         stem.with_name(f"{stem.name}_weights.npz"),
         **{f"w.{name}": as_convolution(name, tensor).detach().numpy() for name, tensor in weights.items()},

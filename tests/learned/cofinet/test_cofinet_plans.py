@@ -24,7 +24,9 @@ from hybridreg.learned.patches import build_patches
 BLOCKS = ["self", "cross", "self"]
 
 
-def plan(backbone: dict[str, Any], dim: int, heads: int, patch: tuple[int, int], **selection: Any) -> dict[str, Any]:
+def plan(
+    backbone: dict[str, Any], dim: int, heads: int, patch: tuple[int, int], **selection: Any
+) -> dict[str, Any]:
     """A recorded configuration as the original's recordings have it."""
     fine = dim >> (backbone["stages"] - 1)
     voxel = backbone["voxel"]
@@ -67,7 +69,9 @@ PLANS = {
         (10, 18),
     ),
     "two stages, every pair": plan(
-        backbone_plan(["simple", "resnetb", "resnetb_strided", "nearest_upsample", "last_unary"], 12, 15, 1.5),
+        backbone_plan(
+            ["simple", "resnetb", "resnetb_strided", "nearest_upsample", "last_unary"], 12, 15, 1.5
+        ),
         16,
         2,
         (6, 5),
@@ -160,7 +164,9 @@ def test_other_plans(tmp_path: Path, name: str) -> None:
     assert main([str(tmp_path / "made")]) == 0
     with np.load(tmp_path / "made.npz") as arrays:
         values = dict(arrays)
-    worst = np.unravel_index(values["out.coarse_log_assignment"][:-1, :-1].argmin(), values["out.coarse_scores"].shape)
+    worst = np.unravel_index(
+        values["out.coarse_log_assignment"][:-1, :-1].argmin(), values["out.coarse_scores"].shape
+    )
     spoiled = {
         "loss.out.matching_loss": values["loss.out.matching_loss"] + np.float32(1e-3),
         "out.node_corr": np.vstack([values["out.node_corr"][:-1], worst]),

@@ -62,7 +62,15 @@ PLANS = {
     ),
     "four stages, simple blocks": plan(
         backbone_plan(
-            ["simple", "simple_strided", "resnetb", "resnetb", "resnetb_strided", "resnetb", "resnetb_strided"]
+            [
+                "simple",
+                "simple_strided",
+                "resnetb",
+                "resnetb",
+                "resnetb_strided",
+                "resnetb",
+                "resnetb_strided",
+            ]
             + ["nearest_upsample", "unary", "unary", *UP],
             12,
             15,
@@ -144,6 +152,7 @@ def test_what_one_would_guess_wrong_is_noticed(
     recording_stem: Path, change: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     import recorded_predator
+
     from hybridreg.learned import blocks, message_attention
     from hybridreg.learned.predator import losses
 
@@ -169,7 +178,9 @@ def test_what_one_would_guess_wrong_is_noticed(
         monkeypatch.setattr(blocks.PointInstanceNorm, "forward", per_cloud)
     else:
         circle = losses.circle
-        monkeypatch.setattr(losses, "circle", lambda *a: circle(*a[:3], type("", (), {**vars(a[3]), "log_scale": 48.0})))
+        monkeypatch.setattr(
+            losses, "circle", lambda *a: circle(*a[:3], type("", (), {**vars(a[3]), "log_scale": 48.0}))
+        )
     found = recorded_predator.compare(recording_stem.with_name("predator_kitti_mini"))
     assert any(not value <= tolerance for value, tolerance in found.values())
 
