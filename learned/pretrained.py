@@ -63,7 +63,7 @@ class Pretrained:
         network: Any = cls(config)  # type: ignore[call-arg]
         load_tensors(network, tensors, origin)
         network.eval()
-        return network  # type: ignore[no-any-return]
+        return network
 
     def save_pretrained(self, folder: str | os.PathLike[str], *, half: bool = False) -> None:
         """Write both files, each whole or not at all; ``half`` stores float16."""

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import io
+from collections import OrderedDict
 from contextlib import AbstractContextManager, nullcontext
 from typing import Any
 
@@ -32,17 +33,13 @@ def parse_torch(data: bytes, name: str) -> Any:
         raise fault(name, problem, _TRUSTED) from error
 
 
-class _Settings(dict):  # type: ignore[type-arg]
-    """What stands in for a class of settings: its items, and nothing that runs."""
-
-
 def _settings() -> AbstractContextManager[Any]:
-    # Checkpoints of 2019 keep their options in an EasyDict, a dictionary with attributes. torch before 2.6 takes no
-    # stand-in under another name and refuses such files.
+    # Checkpoints of 2019 keep their options in an EasyDict, a dictionary with attributes: a plain one stands in for it.
+    # torch before 2.6 takes no stand-in and refuses such files.
     import torch
 
     try:
-        return torch.serialization.safe_globals([(_Settings, "easydict.EasyDict")])
+        return torch.serialization.safe_globals([(OrderedDict, "easydict.EasyDict")])
     except (AttributeError, TypeError, ValueError):
         return nullcontext()
 

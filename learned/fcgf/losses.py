@@ -71,15 +71,11 @@ def hardest_contrastive(
 
 def _mine(anchor: Tensor, side: Tensor, candidates: Tensor, config: FcgfLossConfig) -> Mined:
     among = side[candidates]
-    with torch.no_grad():
-        # Differences, not a product of matrices: features may have any length, and equal ones must come out at 0.
-        best = torch.cat([_squares(part, among).argmin(1) for part in anchor.detach().split(256)])
+    # Differences, not a product of matrices: features may have any length, and equal ones must come out at 0.
+    apart = torch.cdist(anchor.detach(), among.detach(), compute_mode="donot_use_mm_for_euclid_dist")
+    best = apart.argmin(1)
     distance = ((anchor - among[best]).square().sum(1) + config.distance_eps).sqrt()
     return Mined(row=candidates[best], distance=distance, negative=torch.ones_like(best, dtype=torch.bool))
-
-
-def _squares(anchor: Tensor, among: Tensor) -> Tensor:
-    return (anchor[:, None] - among[None]).square().sum(2)
 
 
 def _key(source: Tensor, target: Tensor, n_target: int) -> Tensor:

@@ -16,8 +16,9 @@ from hybridreg.learned.fcgf.losses import hardest_contrastive
 from hybridreg.learned.fcgf.memory import forward_bytes
 from hybridreg.learned.fcgf.official_names import config_of, official_name
 from hybridreg.learned.fcgf.targets import FcgfTargets
+from hybridreg.learned.layers.kernel_maps import KernelMap
 from hybridreg.learned.layers.sparse_conv import SparseConv
-from hybridreg.learned.layers.voxels import KernelMap, VoxelPyramid
+from hybridreg.learned.layers.voxels import VoxelPyramid
 from hybridreg.learned.pretrained import Pretrained, read_checkpoint
 from hybridreg.learned.weights import load_official_tensors
 
@@ -81,20 +82,20 @@ class FcgfNetwork(Pretrained, nn.Module):
         features, skips = clouds.features[pyramid.order], []
         for level, layer in enumerate(self.encoder):
             kernel, fine = (config.kernel, level - 1) if level else (config.first_kernel, 0)
-            features = layer(features, _pairs(pyramid, kernel, fine, level), self._same(pyramid, level))
+            features = layer(features, _map(pyramid, kernel, fine, level), self._same(pyramid, level))
             skips.append(features)
         for level in reversed(range(len(self.decoder))):
-            down = pyramid.map(config.tr_kernel, level, level + 1).transposed
+            down = pyramid.map(config.tr_kernel, level, level + 1)
             features = self.decoder[level](features, down, self._same(pyramid, level))
             features = torch.cat([features, skips[level]], 1)
-        features = self.final(self.mix(features, None).relu(), _pairs(pyramid, config.final_kernel, 0, 0))
+        features = self.final(self.mix(features, None).relu(), _map(pyramid, config.final_kernel, 0, 0))
         features = features[pyramid.inverse]
         if not config.normalize:
             return features
         return features / (features.norm(dim=1, keepdim=True) + config.normalize_eps)
 
     def _same(self, pyramid: VoxelPyramid, level: int) -> KernelMap | None:
-        return _pairs(pyramid, self.config.kernel, level, level)
+        return _map(pyramid, self.config.kernel, level, level)
 
     def losses(self, output: FcgfOutput, targets: FcgfTargets) -> dict[str, Tensor]:
         """Hardest-contrastive loss by part, weighed: their sum is what is trained."""
@@ -147,9 +148,9 @@ class _Level(nn.Module):
         self.norm = _norm(width, config)
         self.block = _Block(width, config)
 
-    def forward(self, features: Tensor, pairs: KernelMap | None, same: KernelMap | None) -> Tensor:
+    def forward(self, features: Tensor, across: KernelMap | None, same: KernelMap | None) -> Tensor:
         # A block ends in a ReLU: the one that the published code applies after it changes nothing.
-        out: Tensor = self.block(self.norm(self.conv(features, pairs)), same)
+        out: Tensor = self.block(self.norm(self.conv(features, across)), same)
         return out
 
 
@@ -171,5 +172,5 @@ def _norm(width: int, config: FcgfConfig) -> nn.BatchNorm1d:
     return nn.BatchNorm1d(width, eps=config.bn_eps, momentum=config.bn_momentum)
 
 
-def _pairs(pyramid: VoxelPyramid, kernel: int, fine: int, coarse: int) -> KernelMap | None:
+def _map(pyramid: VoxelPyramid, kernel: int, fine: int, coarse: int) -> KernelMap | None:
     return None if kernel == 1 and fine == coarse else pyramid.map(kernel, fine, coarse)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Sparse 3-D convolution in plain torch: gather, one matrix product an offset, sum.
+"""Sparse 3-D convolution in plain torch: gather, one matrix product an offset, add.
 
 The tensors and what they mean are MinkowskiEngine's (0.5.4), so that weights trained there fit.
 """
@@ -7,17 +7,16 @@ The tensors and what they mean are MinkowskiEngine's (0.5.4), so that weights tr
 from __future__ import annotations
 
 import math
-from itertools import accumulate
 from typing import Any
 
 import torch
 from torch import Tensor, nn
 from torch.nn import functional as F
 
-from hybridreg.learned.layers.voxels import KernelMap
+from hybridreg.learned.layers.kernel_maps import KernelMap, Pairs
 
 # Up to so many input channels a product with all offsets at once is cheaper than one product an offset.
-_FEW_CHANNELS = 4
+FEW_CHANNELS = 4
 
 
 class SparseConv(nn.Module):
@@ -30,55 +29,55 @@ class SparseConv(nn.Module):
     size
         Edge of the kernel. Of an edge of 1 the kernel is a matrix (dim_in, dim_out), else (size^3, dim_in, dim_out).
     transposed
-        Only for the initial weights: uniform within 1 / sqrt(dim * size^3), ``dim`` the outputs of a transposed
-        convolution and the inputs of others (MinkowskiConvolution.py). The map decides what is computed.
+        Go back from the coarse voxels of a map to the fine ones. Initial weights are uniform within
+        1 / sqrt(dim * size^3), ``dim`` the outputs of a transposed convolution and the inputs of others
+        (MinkowskiConvolution.py 332-340).
     """
 
     def __init__(
         self, dim_in: int, dim_out: int, size: int, *, transposed: bool = False, bias: bool = False
     ) -> None:
         super().__init__()
-        self.size = size
+        self.size, self.transposed = size, transposed
         volume = size**3
         bound = 1.0 / math.sqrt((dim_out if transposed else dim_in) * volume)
         shape = (dim_in, dim_out) if volume == 1 else (volume, dim_in, dim_out)
         self.kernel = nn.Parameter(torch.empty(shape).uniform_(-bound, bound))
         self.bias = nn.Parameter(torch.empty(1, dim_out).uniform_(-bound, bound)) if bias else None
 
-    def forward(self, features: Tensor, pairs: KernelMap | None) -> Tensor:
-        """Features (N, dim_in) of the input voxels to (M, dim_out) of the output's; a 1x1x1 kernel needs no pairs."""
+    def forward(self, features: Tensor, voxels: KernelMap | None) -> Tensor:
+        """Features (N, dim_in) of the input voxels to (M, dim_out) of the output's; a 1x1x1 kernel needs no map."""
         if self.size == 1:
             out = features @ self.kernel
         else:
-            assert pairs is not None, "a kernel wider than 1 needs its pairs"
-            out = convolve(features, self.kernel, pairs)
+            assert voxels is not None, "a kernel wider than 1 needs a map"
+            out = convolve(features, self.kernel, voxels, transposed=self.transposed)
         return out if self.bias is None else out + self.bias
 
 
-def convolve(features: Tensor, kernel: Tensor, pairs: KernelMap) -> Tensor:
-    """Features (n_input, C) and a kernel (K^3, C, D) to (n_output, D)."""
-    if features.shape[1] <= _FEW_CHANNELS:
-        return _all_offsets(features, kernel, pairs)
-    out: Tensor = _Convolution.apply(features, kernel, pairs)
+def convolve(features: Tensor, kernel: Tensor, voxels: KernelMap, *, transposed: bool = False) -> Tensor:
+    """Features (N, C) and a kernel (K^3, C, D) to (M, D), from a map's inputs to its outputs or, transposed, back."""
+    if features.shape[1] <= FEW_CHANNELS and not transposed:
+        return _all_offsets(features, kernel, voxels)
+    out: Tensor = _Convolution.apply(
+        features, kernel, voxels.pairs.transposed if transposed else voxels.pairs
+    )
     return out
 
 
-def _all_offsets(features: Tensor, kernel: Tensor, pairs: KernelMap) -> Tensor:
-    volume, dim_in, dim_out = kernel.shape
-    counts = torch.tensor(pairs.counts, device=features.device)
-    offset = torch.arange(volume, device=features.device).repeat_interleave(counts, output_size=len(pairs))
-    columns = features.new_zeros(pairs.n_output * volume, dim_in)
-    columns = columns.index_copy(0, pairs.output * volume + offset, features[pairs.input])
-    return columns.view(pairs.n_output, volume * dim_in) @ kernel.reshape(volume * dim_in, dim_out)
+def _all_offsets(features: Tensor, kernel: Tensor, voxels: KernelMap) -> Tensor:
+    padded = torch.cat([features, features.new_zeros(1, features.shape[1])])
+    columns = padded.index_select(0, voxels.table.flatten())
+    return columns.view(len(voxels.table), -1) @ kernel.reshape(-1, kernel.shape[2])
 
 
 class _Convolution(torch.autograd.Function):
-    # torch would keep every gathered row for the gradient, and scatter row by row.
+    # torch would keep every gathered row for the gradient.
     @staticmethod
-    def forward(ctx: Any, features: Tensor, kernel: Tensor, pairs: KernelMap) -> Tensor:
+    def forward(ctx: Any, features: Tensor, kernel: Tensor, pairs: Pairs) -> Tensor:
         ctx.save_for_backward(features, kernel)
         ctx.pairs = pairs
-        return _sum(_products(features, kernel, pairs.input, pairs.counts), pairs.by_output)
+        return _added(features, kernel, pairs)
 
     @staticmethod
     def backward(ctx: Any, gradient: Tensor) -> tuple[Tensor | None, Tensor | None, None]:
@@ -86,28 +85,23 @@ class _Convolution(torch.autograd.Function):
         gradient = gradient.contiguous()
         of_features = of_kernel = None
         if ctx.needs_input_grad[0]:
-            back = _products(gradient, kernel.transpose(1, 2), pairs.output, pairs.counts)
-            of_features = _sum(back, pairs.by_input)
+            of_features = _added(gradient, kernel.transpose(1, 2), pairs.transposed)
         if ctx.needs_input_grad[1]:
-            of_kernel = torch.zeros_like(kernel)
-            for k, part in enumerate(_parts(pairs.counts)):
-                of_kernel[k] = features[pairs.input[part]].t() @ gradient[pairs.output[part]]
+            parts = zip(pairs.input.split(pairs.counts), pairs.output.split(pairs.counts), strict=True)
+            of_kernel = torch.stack([features[i].t() @ gradient[o] for i, o in parts])
         return of_features, of_kernel, None
 
 
-def _products(rows: Tensor, matrices: Tensor, index: Tensor, counts: tuple[int, ...]) -> Tensor:
-    out = rows.new_empty(len(index), matrices.shape[2])
-    for k, part in enumerate(_parts(counts)):
-        if counts[k]:
-            torch.mm(rows.index_select(0, index[part]), matrices[k], out=out[part])
-    return out
-
-
-def _parts(counts: tuple[int, ...]) -> list[slice]:
-    return [slice(end - count, end) for count, end in zip(counts, accumulate(counts), strict=True)]
-
-
-def _sum(rows: Tensor, bags: tuple[Tensor, Tensor]) -> Tensor:
-    if len(rows) == 0:
-        return rows.new_zeros(len(bags[1]), rows.shape[1])
-    return F.embedding_bag(bags[0], rows, bags[1], mode="sum")
+def _added(rows: Tensor, matrices: Tensor, pairs: Pairs) -> Tensor:
+    if len(pairs) == 0:
+        return rows.new_zeros(pairs.n_output, matrices.shape[2])
+    products = rows.new_empty(len(pairs), matrices.shape[2])
+    gathered = rows.new_empty(max(pairs.counts), rows.shape[1])
+    parts = zip(
+        pairs.input.split(pairs.counts), matrices.unbind(0), products.split(pairs.counts), strict=True
+    )
+    for index, matrix, out in parts:
+        if len(index):
+            part = torch.index_select(rows, 0, index, out=gathered[: len(index)])
+            torch.mm(part, matrix, out=out)
+    return F.embedding_bag(pairs.by_output[0], products, pairs.by_output[1], mode="sum")

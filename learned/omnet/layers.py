@@ -30,7 +30,7 @@ def _point_layers(dim_in: int, widths: Sequence[int], config: OmnetConfig) -> nn
 
 
 class Encoder(nn.Module):
-    """Points (B, 3, N) and their mask (B, 1, N) to features (B, l, N), those of the last layer, and pooled ones (B, g)."""
+    """Points (B, 3, N) and their mask (B, 1, N) to features (B, l, N), the last layer's, and pooled ones (B, g)."""
 
     def __init__(self, config: OmnetConfig) -> None:
         super().__init__()

@@ -20,8 +20,9 @@ from hybridreg.learned.fcgf.losses import Mined, hardest_contrastive
 from hybridreg.learned.fcgf.network import FcgfNetwork
 from hybridreg.learned.fcgf.official_names import official_name
 from hybridreg.learned.fcgf.targets import FcgfTargets, positive_pairs
+from hybridreg.learned.layers.kernel_maps import kernel_offsets
 from hybridreg.learned.layers.sparse_conv import convolve
-from hybridreg.learned.layers.voxels import VoxelPyramid, kernel_offsets, quantise
+from hybridreg.learned.layers.voxels import VoxelPyramid, quantise
 from hybridreg.learned.procrustes import apply_transform
 from hybridreg.learned.weights import load_official_tensors
 
@@ -137,7 +138,7 @@ def _alone(want: Mapping[str, Tensor]) -> Found:
         "k5s1": (convolve(features, want["unit.weight_5"], pyramid.map(5, 0, 0)), 0),
         "k3s2": (down, 1),
         "k2s2": (convolve(features, want["unit.weight_2"], pyramid.map(2, 0, 1)), 1),
-        "k3s2_then_tr3s2": (convolve(down, tr3, pyramid.map(3, 0, 1).transposed), 0),
+        "k3s2_then_tr3s2": (convolve(down, tr3, pyramid.map(3, 0, 1), transposed=True), 0),
         "k3s2_k3s2_k3s1": (convolve(twice, k3, pyramid.map(3, 2, 2)), 2),
         "coords.s2": (pyramid.levels[1][:, 1:], 1),
         "coords.s4": (pyramid.levels[2][:, 1:], 2),
