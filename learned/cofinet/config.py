@@ -117,8 +117,9 @@ class CofinetConfig:
 def _loss(voxel: float, **changes: Any) -> CofinetLossConfig:
     # The published radii in voxels.
     base, scale = CofinetLossConfig(), voxel / 0.3
-    radii = {"overlap_radius": base.overlap_radius * scale, "fine_radius": base.fine_radius * scale}
-    return dataclasses.replace(base, **radii, **changes)
+    return dataclasses.replace(
+        base, overlap_radius=base.overlap_radius * scale, fine_radius=base.fine_radius * scale, **changes
+    )
 
 
 def _kitti() -> CofinetConfig:

@@ -3,7 +3,8 @@
 
 from __future__ import annotations
 
-from typing import Literal, NamedTuple
+from dataclasses import dataclass
+from typing import Literal
 
 from torch import Tensor
 from torch.nn import functional as F
@@ -11,7 +12,8 @@ from torch.nn import functional as F
 from hybridreg.learned.patches import build_patches
 
 
-class PatchIndex(NamedTuple):
+@dataclass(frozen=True)
+class PatchIndex:
     """Points of each patch."""
 
     index: Tensor  # (B, P) int64 into the cloud's points, pad their number
