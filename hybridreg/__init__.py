@@ -35,8 +35,10 @@ if TYPE_CHECKING:
     from hybridreg.classical.visibility import Visibility
     from hybridreg.classical.voxel import VoxelGrid
     from hybridreg.cloud import PointCloud
+    from hybridreg.learned.cofinet.stage import Cofinet
     from hybridreg.learned.fcgf.stage import Fcgf
     from hybridreg.learned.omnet.stage import OmNet
+    from hybridreg.learned.predator.stage import Predator, PredatorOverlap
     from hybridreg.learned.roitr.stage import Roitr
     from hybridreg.learned.stages.dense import DenseFeatures
     from hybridreg.learned.stages.geotransformer import GeoTransformer
@@ -70,8 +72,10 @@ _WHERE = {
     "hybridreg.classical.visibility": ["Visibility"],
     "hybridreg.classical.voxel": ["VoxelGrid"],
     "hybridreg.cloud": ["PointCloud"],
+    "hybridreg.learned.cofinet.stage": ["Cofinet"],
     "hybridreg.learned.fcgf.stage": ["Fcgf"],
     "hybridreg.learned.omnet.stage": ["OmNet"],
+    "hybridreg.learned.predator.stage": ["Predator", "PredatorOverlap"],
     "hybridreg.learned.roitr.stage": ["Roitr"],
     "hybridreg.learned.stages.dense": ["DenseFeatures"],
     "hybridreg.learned.stages.geotransformer": ["GeoTransformer"],
