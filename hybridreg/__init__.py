@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from hybridreg.classical.fgr import Fgr
     from hybridreg.classical.fpfh import Fpfh
     from hybridreg.classical.gicp import Gicp
+    from hybridreg.classical.hcf import Hcf
     from hybridreg.classical.icp import Icp
     from hybridreg.classical.kiss import KissMatcher
     from hybridreg.classical.kiss_icp import KissIcp
@@ -34,13 +35,17 @@ if TYPE_CHECKING:
     from hybridreg.classical.visibility import Visibility
     from hybridreg.classical.voxel import VoxelGrid
     from hybridreg.cloud import PointCloud
+    from hybridreg.learned.cofinet.stage import Cofinet
     from hybridreg.learned.fcgf.stage import Fcgf
     from hybridreg.learned.omnet.stage import OmNet
+    from hybridreg.learned.predator.stage import Predator, PredatorOverlap
+    from hybridreg.learned.roitr.stage import Roitr
     from hybridreg.learned.stages.dense import DenseFeatures
     from hybridreg.learned.stages.geotransformer import GeoTransformer
     from hybridreg.learned.stages.lgr import Lgr
     from hybridreg.learned.stages.omp import Omp
     from hybridreg.learned.stages.vgam import Vgam
+    from hybridreg.learned.vrhcf.stage import Vrhcf
     from hybridreg.matches import Correspondences, Overlap, Pose
     from hybridreg.pair import LabelledPair, Pair
     from hybridreg.pipeline import Pipeline, Trace
@@ -55,6 +60,7 @@ _WHERE = {
     "hybridreg.classical.fgr": ["Fgr"],
     "hybridreg.classical.fpfh": ["Fpfh"],
     "hybridreg.classical.gicp": ["Gicp"],
+    "hybridreg.classical.hcf": ["Hcf"],
     "hybridreg.classical.icp": ["Icp"],
     "hybridreg.classical.kiss": ["KissMatcher"],
     "hybridreg.classical.kiss_icp": ["KissIcp"],
@@ -66,13 +72,17 @@ _WHERE = {
     "hybridreg.classical.visibility": ["Visibility"],
     "hybridreg.classical.voxel": ["VoxelGrid"],
     "hybridreg.cloud": ["PointCloud"],
+    "hybridreg.learned.cofinet.stage": ["Cofinet"],
     "hybridreg.learned.fcgf.stage": ["Fcgf"],
     "hybridreg.learned.omnet.stage": ["OmNet"],
+    "hybridreg.learned.predator.stage": ["Predator", "PredatorOverlap"],
+    "hybridreg.learned.roitr.stage": ["Roitr"],
     "hybridreg.learned.stages.dense": ["DenseFeatures"],
     "hybridreg.learned.stages.geotransformer": ["GeoTransformer"],
     "hybridreg.learned.stages.lgr": ["Lgr"],
     "hybridreg.learned.stages.omp": ["Omp"],
     "hybridreg.learned.stages.vgam": ["Vgam"],
+    "hybridreg.learned.vrhcf.stage": ["Vrhcf"],
     "hybridreg.matches": ["Correspondences", "Overlap", "Pose"],
     "hybridreg.pair": ["LabelledPair", "Pair"],
     "hybridreg.pipeline": ["Pipeline", "Trace"],

@@ -75,12 +75,14 @@ class KpconvFpn(nn.Module):
 
     def _encode_stage(self, features: Tensor, pyramid: Pyramid, stage: int, blocks: nn.ModuleList) -> Tensor:
         cylindrical = self.config.kernel == "cylindrical"
-        plain = _plain(pyramid, stage, cylindrical)
+        plain = plain_surroundings(pyramid, stage, cylindrical)
         if self.config.shared_kernel_points:
             plain = _with_influence(plain, blocks[-1])
         for index, block in enumerate(blocks):
             strided = stage > 0 and index == 0
-            features = block(features, _strided(pyramid, stage, cylindrical) if strided else plain)
+            features = block(
+                features, strided_surroundings(pyramid, stage, cylindrical) if strided else plain
+            )
         return features
 
 
@@ -114,25 +116,34 @@ def _block(plan: BlockPlan, first: bool, rng: np.random.Generator | None) -> nn.
     return ConvBlock(plan, rng) if first else ResidualBlock(plan, rng)
 
 
-def _plain(pyramid: Pyramid, stage: int, cylindrical: bool) -> Surroundings:
+def plain_surroundings(
+    pyramid: Pyramid, stage: int, cylindrical: bool = False, *, exact: bool = False
+) -> Surroundings:
+    """Of a stage's points among themselves; stages count from 0."""
     points, lengths, neighbors = pyramid.points[stage], pyramid.lengths[stage], pyramid.neighbors[stage]
-    links = _links(points, points, neighbors, cylindrical)
+    links = _links(points, points, neighbors, cylindrical, exact)
     return Surroundings(neighbors, lengths, lengths, links)
 
 
-def _strided(pyramid: Pyramid, stage: int, cylindrical: bool) -> Surroundings:
+def strided_surroundings(
+    pyramid: Pyramid, stage: int, cylindrical: bool = False, *, exact: bool = False
+) -> Surroundings:
+    """Of a stage's points among those of the finer stage before it."""
     neighbors = pyramid.subsampling[stage - 1]
     return Surroundings(
         neighbors,
         lengths=pyramid.lengths[stage],
         support_lengths=pyramid.lengths[stage - 1],
-        links=_links(pyramid.points[stage], pyramid.points[stage - 1], neighbors, cylindrical),
+        links=_links(pyramid.points[stage], pyramid.points[stage - 1], neighbors, cylindrical, exact),
     )
 
 
-def _links(queries: Tensor, supports: Tensor, neighbors: Tensor, cylindrical: bool) -> Links | DenseLinks:
-    find = DenseLinks.find if queries.is_cuda else find_links
-    return find(queries, supports, neighbors, cylindrical=cylindrical)
+def _links(
+    queries: Tensor, supports: Tensor, neighbors: Tensor, cylindrical: bool, exact: bool
+) -> Links | DenseLinks:
+    if queries.is_cuda:
+        return DenseLinks.find(queries, supports, neighbors, cylindrical=cylindrical)
+    return find_links(queries, supports, neighbors, cylindrical=cylindrical, exact=exact)
 
 
 def _with_influence(around: Surroundings, block: nn.Module) -> Surroundings:

@@ -4,16 +4,41 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal, Protocol
 
 import numpy as np
 import numpy.typing as npt
 import torch
 from torch import Tensor
 
-from hybridreg.learned.config import NetworkConfig
+from hybridreg.learned.config import ImageConfig
 from hybridreg.learned.image_input import image_tensor
 from hybridreg.learned.input_features import input_features
-from hybridreg.learned.pyramid import Pyramid, build_pyramid
+from hybridreg.learned.pyramid import Pyramid, PyramidPlan, build_pyramid
+
+
+class BackbonePlan(PyramidPlan, Protocol):
+    """What a backbone's configuration tells of a batch."""
+
+    @property
+    def max_range(self) -> float | None:
+        """Metres from the cloud's median; farther points are left out."""
+
+    @property
+    def input_features(self) -> Literal["ones", "geometric"]:
+        """What the points bring along."""
+
+
+class BatchPlan(Protocol):
+    """What a network's configuration tells of a batch."""
+
+    @property
+    def backbone(self) -> BackbonePlan:
+        """Of the encoder."""
+
+    @property
+    def image(self) -> ImageConfig | None:
+        """Of the image; None where the network looks at none."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -33,7 +58,7 @@ class Batch:
 def make_batch(
     target: npt.NDArray[np.floating],
     source: npt.NDArray[np.floating],
-    config: NetworkConfig,
+    config: BatchPlan,
     *,
     image: npt.NDArray[np.uint8] | None = None,
     subsample: bool = True,

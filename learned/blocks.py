@@ -52,16 +52,37 @@ class PointGroupNorm(nn.Module):
         return done[0] if len(done) == 1 else torch.cat(done)
 
 
+class PointInstanceNorm(nn.Module):
+    """Instance normalisation of (N, C) features, each channel apart, over all points of both clouds; no weights.
+
+    So a cloud's features depend on the other cloud. Predator's and CoFiNet's code calls it batch normalisation; it
+    keeps no statistics, and training and evaluation compute the same.
+    """
+
+    def forward(self, features: Tensor, lengths: tuple[int, int], slope: float = 1.0) -> Tensor:
+        """(N, C) to (N, C); ``slope`` is a LeakyReLU's."""
+        dim = features.shape[1]
+        return group_norm(features, features.new_ones(dim), features.new_zeros(dim), dim, slope)
+
+
+def point_norm(dim: int, groups: int | None, per_cloud: bool) -> PointGroupNorm | PointInstanceNorm:
+    """Group normalisation, or where there are no groups instance normalisation of the stacked clouds."""
+    return PointInstanceNorm() if groups is None else PointGroupNorm(dim, groups, per_cloud)
+
+
 class Unary(nn.Module):
-    """Linear, then group normalisation, then LeakyReLU unless ``activate`` is false."""
+    """Linear, then normalisation, then LeakyReLU unless ``activate`` is false.
+
+    ``groups`` None stands for instance normalisation, and for no bias, which it would take off again.
+    """
 
     def __init__(
-        self, dim_in: int, dim_out: int, groups: int, per_cloud: bool, *, activate: bool = True
+        self, dim_in: int, dim_out: int, groups: int | None, per_cloud: bool, *, activate: bool = True
     ) -> None:
         super().__init__()
         self.activate = activate
-        self.linear = nn.Linear(dim_in, dim_out)
-        self.norm = PointGroupNorm(dim_out, groups, per_cloud)
+        self.linear = nn.Linear(dim_in, dim_out, bias=groups is not None)
+        self.norm = point_norm(dim_out, groups, per_cloud)
 
     def forward(self, features: Tensor, lengths: tuple[int, int]) -> Tensor:
         """(N, C_in) to (N, C_out)."""
@@ -80,7 +101,7 @@ class BlockPlan:
     dim_out: int
     radius: float
     sigma: float
-    groups: int
+    groups: int | None  # of group normalisation; None: instance normalisation and no biases
     per_cloud: bool
     n_kernel: int
     cylindrical: bool = False
@@ -92,14 +113,18 @@ class BlockPlan:
             return cylindrical_kernel_points(self.n_kernel, self.radius)
         return kernel_points(self.n_kernel, self.radius, rng)
 
+    def convolution(self, dim_in: int, dim_out: int, rng: np.random.Generator | None) -> KPConv:
+        """The block's convolution."""
+        return KPConv(dim_in, dim_out, self.sigma, self.kernel(rng), bias=self.groups is not None)
+
 
 class ConvBlock(nn.Module):
-    """KPConv, group normalisation, LeakyReLU."""
+    """KPConv, normalisation, LeakyReLU."""
 
     def __init__(self, plan: BlockPlan, rng: np.random.Generator | None) -> None:
         super().__init__()
-        self.conv = KPConv(plan.dim_in, plan.dim_out, plan.sigma, plan.kernel(rng))
-        self.norm = PointGroupNorm(plan.dim_out, plan.groups, plan.per_cloud)
+        self.conv = plan.convolution(plan.dim_in, plan.dim_out, rng)
+        self.norm = point_norm(plan.dim_out, plan.groups, plan.per_cloud)
 
     def forward(self, features: Tensor, around: Surroundings) -> Tensor:
         """(M, C_in) to (N, C_out)."""
@@ -116,8 +141,8 @@ class ResidualBlock(nn.Module):
         middle = plan.dim_out // 4
         self.strided = plan.strided
         self.unary_in = Unary(plan.dim_in, middle, groups, per_cloud) if plan.dim_in != middle else None
-        self.conv = KPConv(middle, middle, plan.sigma, plan.kernel(rng))
-        self.norm = PointGroupNorm(middle, groups, per_cloud)
+        self.conv = plan.convolution(middle, middle, rng)
+        self.norm = point_norm(middle, groups, per_cloud)
         self.unary_out = Unary(middle, plan.dim_out, groups, per_cloud, activate=False)
         widens = plan.dim_in != plan.dim_out
         self.unary_shortcut = (

@@ -16,7 +16,11 @@ from hybridreg.learned.influence import Influence
 
 
 def kernel_point_convolution(
-    features: Tensor, neighbors: Tensor, influence: Influence | DenseInfluence, weights: Tensor, bias: Tensor
+    features: Tensor,
+    neighbors: Tensor,
+    influence: Influence | DenseInfluence,
+    weights: Tensor,
+    bias: Tensor | None,
 ) -> Tensor:
     """Convolve: ``f_i = 1/n_i sum_k (sum_j h_ijk F_j) W_k + b``.
 
@@ -31,7 +35,7 @@ def kernel_point_convolution(
     weights
         (K, C_in, C_out).
     bias
-        (C_out,).
+        (C_out,), or None.
 
     Returns
     -------
@@ -40,7 +44,7 @@ def kernel_point_convolution(
     """
     total = influence.convolve(features, weights)
     share = _positive_neighbors(features.detach(), neighbors).to(features.dtype).reciprocal()
-    return torch.addcmul(bias, total, share[:, None])
+    return total * share[:, None] if bias is None else torch.addcmul(bias, total, share[:, None])
 
 
 def _positive_neighbors(features: Tensor, neighbors: Tensor) -> Tensor:
@@ -56,20 +60,24 @@ def _positive_neighbors(features: Tensor, neighbors: Tensor) -> Tensor:
 class KPConv(nn.Module):
     """A kernel point convolution from ``dim_in`` to ``dim_out`` channels.
 
-    ``points`` (K, 3) are the kernel points and ``sigma`` their reach, in metres.
+    ``points`` (K, 3) are the kernel points and ``sigma`` their reach, in metres. GeoTransformer has a ``bias``,
+    Predator and CoFiNet have none.
     """
 
     kernel: Tensor
 
-    def __init__(self, dim_in: int, dim_out: int, sigma: float, points: npt.NDArray[np.float32]) -> None:
+    def __init__(
+        self, dim_in: int, dim_out: int, sigma: float, points: npt.NDArray[np.float32], *, bias: bool = True
+    ) -> None:
         super().__init__()
         self.sigma = sigma
         self.weights = nn.Parameter(torch.empty(len(points), dim_in, dim_out))
-        self.bias = nn.Parameter(torch.empty(dim_out))
+        self.bias = nn.Parameter(torch.empty(dim_out)) if bias else None
         self.register_buffer("kernel", torch.from_numpy(points))
         bound = 1.0 / math.sqrt(dim_in * dim_out)
         nn.init.uniform_(self.weights, -bound, bound)
-        nn.init.uniform_(self.bias, -bound, bound)
+        if self.bias is not None:
+            nn.init.uniform_(self.bias, -bound, bound)
 
     def forward(self, features: Tensor, neighbors: Tensor, influence: Influence | DenseInfluence) -> Tensor:
         """(M, C_in) to (N, C_out)."""

@@ -13,19 +13,20 @@ from hybridreg.learned.pyramid import Pyramid
 _FLOAT = 4
 _LINK = 84  # bytes a link: two indices, offset and length, and the tenth of the kernel points that it reaches
 _COPIES = 4  # of a stage's widest features alive at a time: input, output, and the steps between
-_SLACK = 2**26  # what the heap holds beside what is in use: 10 to 80 MB for one and the same pass
+SLACK = 2**26  # what the heap holds beside what is in use: 10 to 80 MB for one and the same pass
 
 
 def forward_bytes(pyramid: Pyramid, config: NetworkConfig) -> int:
     """Estimated peak of a forward pass in bytes, beside what the process and the batch hold already."""
     stages = range(pyramid.stages)
     width = config.backbone.init_dim * 2
-    encoder = max(_stage_bytes(pyramid, stage, width * 2**stage) for stage in stages)
+    encoder = max(stage_bytes(pyramid, stage, width * 2**stage) for stage in stages)
     skips = sum(len(pyramid.points[stage]) * width * 2**stage * _FLOAT for stage in stages)
-    return _SLACK + max(encoder, _attention_bytes(pyramid, config)) + skips
+    return SLACK + max(encoder, _attention_bytes(pyramid, config)) + skips
 
 
-def _stage_bytes(pyramid: Pyramid, stage: int, width: int) -> int:
+def stage_bytes(pyramid: Pyramid, stage: int, width: int) -> int:
+    """Estimated bytes in use while a stage, counted from 0, computes features of a width."""
     links = int((pyramid.neighbors[stage] < len(pyramid.points[stage])).sum())
     return links * _LINK + len(pyramid.points[stage]) * width * _FLOAT * _COPIES
 

@@ -67,3 +67,16 @@ def count_neighbors(queries: Tensor, supports: Tensor, radius: float) -> Tensor:
     tree = cKDTree(supports.cpu().numpy().astype(np.float64))
     counts = tree.query_ball_point(queries.cpu().numpy(), r=radius, return_length=True)
     return torch.from_numpy(np.asarray(counts, dtype=np.int64))
+
+
+def pairs_within(first: Tensor, second: Tensor, radius: float) -> tuple[Tensor, Tensor]:
+    """Rows (P,), (P,) int64 of all points (N, 3), (M, 3) of one frame that are nearer to each other than ``radius``.
+
+    Ordered by the first cloud's points. Searched on the CPU, in float64.
+    """
+    trees = [cKDTree(cloud.detach().cpu().numpy().astype(np.float64)) for cloud in (first, second)]
+    near = trees[0].sparse_distance_matrix(trees[1], radius, output_type="coo_matrix")
+    keep = near.data < radius
+    order = np.lexsort((near.col[keep], near.row[keep]))
+    rows, columns = (torch.from_numpy(side[keep][order].astype(np.int64)) for side in (near.row, near.col))
+    return rows.to(first.device), columns.to(first.device)

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 import torch
 from torch import Tensor
@@ -15,7 +16,7 @@ _CHUNK_PAIRS = 2**22
 
 @dataclass(frozen=True)
 class Patches:
-    """The fine points of each superpoint of one cloud, nearest first."""
+    """The fine points of each superpoint of one cloud."""
 
     owner: Tensor  # (N,) int64: the superpoint of each fine point
     index: Tensor  # (n, K) int64 into the fine points, pad N
@@ -27,12 +28,17 @@ class Patches:
         return self.mask.any(1)
 
 
-def build_patches(points: Tensor, nodes: Tensor, limit: int) -> Patches:
-    """Assign fine points (N, 3) to superpoints (n, 3) and keep the ``limit`` nearest of each."""
+def build_patches(
+    points: Tensor, nodes: Tensor, limit: int, rule: Literal["nearest", "first"] = "nearest"
+) -> Patches:
+    """Assign fine points (N, 3) to superpoints (n, 3) and keep at most ``limit`` of each.
+
+    ``rule`` says which, and in which order: the nearest ones, nearest first, or the first ones as they are numbered.
+    """
     limit = min(limit, len(points))
     distance, owner = _assign(points, nodes)
     # Sort by superpoint, then by distance: two stable sorts.
-    order = distance.argsort(stable=True)
+    order = distance.argsort(stable=True) if rule == "nearest" else torch.arange(len(points)).to(owner)
     order = order[owner[order].argsort(stable=True)]
     counts = torch.bincount(owner, minlength=len(nodes))
     starts = counts.cumsum(0) - counts

@@ -21,8 +21,10 @@ if TYPE_CHECKING:
 
 # What a config.json calls its network, and where that is. Without the key it is `RegistrationNetwork`.
 NETWORKS = {
+    "cofinet": "hybridreg.learned.cofinet.network:CofinetNetwork",
     "fcgf": "hybridreg.learned.fcgf.network:FcgfNetwork",
     "omnet": "hybridreg.learned.omnet.network:OmnetNetwork",
+    "predator": "hybridreg.learned.predator.network:PredatorNetwork",
 }
 
 

@@ -4,13 +4,32 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Protocol
 
 import torch
 from torch import Tensor
 
-from hybridreg.learned.config import BackboneConfig
 from hybridreg.learned.grid import grid_subsample
 from hybridreg.learned.neighbors import count_neighbors, nearest_neighbor, radius_neighbors
+
+
+class PyramidPlan(Protocol):
+    """What a backbone's configuration tells of its pyramid."""
+
+    @property
+    def stages(self) -> int:
+        """Number of stages."""
+
+    @property
+    def voxel(self) -> float:
+        """Edge (m) of the first stage's cells; it doubles with each stage."""
+
+    @property
+    def neighbor_limits(self) -> tuple[int, ...]:
+        """Most neighbours of a point, one number a stage."""
+
+    def radius(self, stage: int) -> float:
+        """Search radius (m) of a stage counted from 0."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -48,9 +67,7 @@ class Pyramid:
         return target, source
 
 
-def build_pyramid(
-    target: Tensor, source: Tensor, config: BackboneConfig, *, subsample: bool = False
-) -> Pyramid:
+def build_pyramid(target: Tensor, source: Tensor, config: PyramidPlan, *, subsample: bool = False) -> Pyramid:
     """Subsample both clouds stage by stage and search all neighbours.
 
     Parameters
@@ -85,7 +102,7 @@ def build_pyramid(
 
 
 def calibrate_neighbor_limits(
-    pairs: list[tuple[Tensor, Tensor]], config: BackboneConfig, *, share: float = 0.8
+    pairs: list[tuple[Tensor, Tensor]], config: PyramidPlan, *, share: float = 0.8
 ) -> tuple[int, ...]:
     """The neighbour count that ``share`` of the points do not exceed, one integer a stage (methods 2.3)."""
     counts: list[list[Tensor]] = [[] for _ in range(config.stages)]
@@ -96,7 +113,7 @@ def calibrate_neighbor_limits(
     return tuple(max(1, int(torch.cat(c).double().quantile(share))) for c in counts)
 
 
-def _levels(points: Tensor, config: BackboneConfig, subsample: bool) -> list[Tensor]:
+def _levels(points: Tensor, config: PyramidPlan, subsample: bool) -> list[Tensor]:
     levels = [grid_subsample(points, config.voxel) if subsample else points]
     for stage in range(1, config.stages):
         levels.append(grid_subsample(levels[-1], config.voxel * 2**stage))

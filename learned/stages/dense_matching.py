@@ -27,6 +27,10 @@ class DensePoints:
     points: Array
     features: Array
 
+    def only(self, rows: Indices) -> DensePoints:
+        """Some of the points."""
+        return DensePoints(points=self.points[rows], features=self.features[rows])
+
 
 def match_dense(
     scene: Scene,
@@ -50,12 +54,19 @@ def match_dense(
         Of the points, metres.
     """
     levels = ((source, scene.source.points, overlap.source), (target, scene.target.points, overlap.target))
-    rows = [_rows(cloud, level, probability, min_overlap) for cloud, level, probability in levels]
-    if not (len(rows[0]) and len(rows[1])):
+    kept = [cloud.only(_rows(cloud, level, probability, min_overlap)) for cloud, level, probability in levels]
+    return match_points(kept[0], kept[1], mutual=mutual, spacing=spacing)
+
+
+def match_points(
+    source: DensePoints, target: DensePoints, *, mutual: bool, spacing: float
+) -> Correspondences:
+    """All points of the source, as `match_dense`."""
+    if not (len(source.points) and len(target.points)):
         return Correspondences.none()
-    found = nearest(source.features[rows[0]], target.features[rows[1]])
-    kept = found.mutual if mutual else np.ones(len(rows[0]), dtype=bool)
-    first, second = rows[0][kept], rows[1][found.row[kept]]
+    found = nearest(source.features, target.features)
+    first = np.flatnonzero(found.mutual) if mutual else np.arange(len(source.points))
+    second = found.row[first]
     cosine = np.sum(unit(source.features[first]) * unit(target.features[second]), axis=1)
     return Correspondences(
         source=source.points[first],

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from functools import lru_cache
+from importlib import import_module
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -17,7 +18,7 @@ from hybridreg.learned.weights import find_files, from_pretrained, load_official
 from hybridreg.threads import single
 
 _DEFAULT_SIZE = "nano"
-_CHECKPOINTS = (".tar", ".pth", ".pt")
+_CHECKPOINTS = (".tar", ".pth", ".pt", ".pkl")
 # Networks held at a time: OMP and a matcher of other weights, each beside the one before it.
 _HELD = 4
 
@@ -65,7 +66,8 @@ def _load(name: NetworkName, stamp: tuple[int, ...]) -> Loaded:
     with single(), torch.random.fork_rng(devices=[]):
         torch.default_generator.manual_seed(0)
         network = _make(name)
-    return Loaded(network.to(name.device).eval().requires_grad_(False), untrained_parts(network))
+    untrained = network.untrained() if hasattr(network, "untrained") else untrained_parts(network)
+    return Loaded(network.to(name.device).eval().requires_grad_(False), untrained)
 
 
 def _make(name: NetworkName) -> Any:
@@ -81,6 +83,8 @@ def _make(name: NetworkName) -> Any:
 
 
 def _make_other(name: NetworkName) -> Any:
+    if ":" in (name.network or ""):
+        return _make_own(name)
     cls = network_class(name.network or "")
     if name.weights is None:
         return cls(cls.named_config(name.size or _DEFAULT_SIZE))
@@ -91,6 +95,18 @@ def _make_other(name: NetworkName) -> Any:
     told = [f"{key}={value!r}" for key, value in name.options if value is not None]
     if told:
         raise ValueError(f"{', '.join(told)}: the weights {name.weights!r} bring their own configuration")
+    return cls.from_pretrained(name.weights)
+
+
+def _make_own(name: NetworkName) -> Any:
+    module, _, attribute = str(name.network).partition(":")
+    cls = getattr(import_module(module), attribute)
+    if name.weights is None:
+        return cls.named(name.size or _DEFAULT_SIZE)
+    if is_checkpoint(name.weights):
+        return cls.load_official(name.weights, name.size)
+    if name.size is not None:
+        raise ValueError(f"size={name.size!r}: the weights {name.weights!r} bring their own configuration")
     return cls.from_pretrained(name.weights)
 
 

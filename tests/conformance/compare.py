@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import torch
@@ -12,11 +13,14 @@ from scipy.spatial import cKDTree
 from torch import Tensor
 
 from hybridreg.learned.circle_loss import circle_loss
+from hybridreg.learned.distances import squared_distances
 from hybridreg.learned.fine_loss import assignment_loss
 from hybridreg.learned.lgr import local_to_global
 from hybridreg.learned.losses import overlap_matrix
 from hybridreg.learned.network import Output
+from hybridreg.learned.patches import build_patches
 from hybridreg.learned.point_matching import mutual_top_k
+from hybridreg.learned.procrustes import apply_transform
 from hybridreg.learned.superpoint_matching import SuperpointMatches, match_superpoints
 from hybridreg.learned.targets import Targets, compute_targets
 
@@ -25,6 +29,8 @@ from hybridreg.learned.targets import Targets, compute_targets
 _PADDED = -1e6
 # Relative: some ten units in the last place of float32.
 _TIE = 5e-6
+# Metres: a distance this near to a radius falls on either side of it; and overlaps that differ by no more are the same.
+_AT_RADIUS, _SAME = 1e-5, 1e-5
 
 
 @torch.no_grad()
@@ -35,7 +41,12 @@ def differences(recording: Recording) -> dict[str, float]:
     targets = compute_targets(recording.batch.pyramid, want["in.transform"], recording.config)
     found = {f"out.{name}": _apart(value, want[f"out.{name}"]) for name, value in blocks.items()}
     found |= _superpoints(recording, output)
-    found |= _targets(targets, want)
+    at_radius = pairs_at_radius(recording, targets)
+    found |= _targets(targets, want, at_radius)
+    if at_radius:
+        # What follows is judged on its own.
+        index, overlap = want["out.gt_node_corr_indices"], want["out.gt_node_corr_overlaps"]
+        targets = replace(targets, target=index[:, 0].long(), source=index[:, 1].long(), overlap=overlap)
     found |= _transport(recording, output)
     found |= _correspondences(recording, output)
     found |= _losses(recording, output, targets)
@@ -108,19 +119,53 @@ def _recorded_pairs(recording: Recording, output: Output) -> SuperpointMatches:
     return found if same else SuperpointMatches(target, source, torch.ones(len(target)))
 
 
-def _targets(targets: Targets, want: dict[str, Tensor]) -> dict[str, float]:
-    index, overlap = want["out.gt_node_corr_indices"], want["out.gt_node_corr_overlaps"]
-    order = _by_pair(index[:, 0], index[:, 1])
-    ours = _by_pair(targets.target, targets.source)
-    same = torch.equal(torch.stack([targets.target, targets.source], 1)[ours], index[order])
+def _targets(
+    targets: Targets, want: dict[str, Tensor], at_radius: dict[tuple[int, int], float]
+) -> dict[str, float]:
+    """Pairs in one truth alone, and largest difference of the overlaps, but for what points at the radius explain."""
+    recorded = _overlaps(want["out.gt_node_corr_indices"], want["out.gt_node_corr_overlaps"])
+    ours = _overlaps(torch.stack([targets.target, targets.source], 1), targets.overlap)
+    if len(want["out.gt_node_corr_indices"]) != len(want["out.gt_node_corr_overlaps"]):
+        return dict.fromkeys(("out.gt_node_corr_indices", "out.gt_node_corr_overlaps"), math.inf)
+    alone = [pair for pair in recorded.keys() ^ ours.keys() if pair not in at_radius]
+    apart = [abs(value - ours.get(pair, 0.0)) - at_radius.get(pair, 0.0) for pair, value in recorded.items()]
+    apart += [value - at_radius.get(pair, 0.0) for pair, value in ours.items() if pair not in recorded]
     return {
-        "out.gt_node_corr_indices": 0.0 if same else math.inf,
-        "out.gt_node_corr_overlaps": _apart(targets.overlap[ours], overlap[order]) if same else math.inf,
+        "out.gt_node_corr_indices": math.inf if alone else 0.0,
+        "out.gt_node_corr_overlaps": max([0.0, *apart]),
     }
 
 
-def _by_pair(target: Tensor, source: Tensor) -> Tensor:
-    return (target * (int(source.max()) + 1) + source).argsort() if len(source) else target
+def _overlaps(index: Tensor, overlap: Tensor) -> dict[tuple[int, int], float]:
+    return {(int(i), int(j)): float(o) for (i, j), o in zip(index, overlap, strict=False)}
+
+
+def pairs_at_radius(recording: Recording, targets: Targets) -> dict[tuple[int, int], float]:
+    """Pairs of patches with different overlaps that hold points within 1e-5 m of the radius.
+
+    With each how far its overlap may be off: such points count or do not, by the last digit of float32.
+    """
+    want, config = recording.values, recording.config
+    recorded = _overlaps(want["out.gt_node_corr_indices"], want["out.gt_node_corr_overlaps"])
+    ours = _overlaps(torch.stack([targets.target, targets.source], 1), targets.overlap)
+    odd = [p for p in recorded.keys() | ours.keys() if abs(recorded.get(p, 0.0) - ours.get(p, 0.0)) > _SAME]
+    nodes = recording.batch.pyramid.clouds(config.backbone.stages - 1)
+    clouds = recording.batch.pyramid.clouds(config.backbone.fine_stage - 1)
+    patches = [build_patches(c, n, config.matching.patch_points) for c, n in zip(clouds, nodes, strict=True)]
+    moved = (clouds[0], apply_transform(clouds[1], targets.transform))
+    found = {}
+    for i, j in odd:
+        first, second = (
+            cloud[patch.index[node][patch.mask[node]]]
+            for cloud, patch, node in zip(moved, patches, (i, j), strict=True)
+        )
+        exact = torch.cdist(first.double(), second.double(), compute_mode="donot_use_mm_for_euclid_dist")
+        expanded = squared_distances(first, second).sqrt()
+        tied = [(d - config.matching.matching_radius).abs() < _AT_RADIUS for d in (exact, expanded)]
+        rows, columns = (int((tied[0] | tied[1]).any(axis).sum()) for axis in (1, 0))
+        if rows:
+            found[i, j] = (rows / len(first) + columns / len(second)) / 2
+    return found
 
 
 def _transport(recording: Recording, output: Output) -> dict[str, float]:

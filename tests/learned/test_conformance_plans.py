@@ -22,6 +22,7 @@ from hybridreg.learned.lgr import local_to_global
 from hybridreg.learned.losses import overlap_matrix
 from hybridreg.learned.network import RegistrationNetwork
 from hybridreg.learned.official_names import official_name
+from hybridreg.learned.procrustes import apply_transform
 from hybridreg.learned.targets import compute_targets
 
 MARGINS = {"positive_margin": 0.1, "negative_margin": 1.4, "positive_optimal": 0.1, "negative_optimal": 1.4}
@@ -177,3 +178,42 @@ def test_other_plans(tmp_path: Path, description: dict) -> None:  # type: ignore
     values["out.loss_fine"] = values["out.loss_fine"] + 1e-3
     np.savez(tmp_path / "made.npz", **values)
     assert main([str(tmp_path / "made")]) == 1
+
+
+def test_points_at_the_radius_are_forgiven_and_counted(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    from compare import pairs_at_radius
+    from plan import read_recording
+    from run import main
+
+    torch.manual_seed(0)
+    description = plan(3, 8, 2, ["self", "cross"])
+    record(tmp_path / "made", description)
+    recording = read_recording(tmp_path / "made")
+    config, want = recording.config, recording.values
+    # The radius is moved onto a distance between two points: the recording counts them, we no longer do.
+    points = recording.batch.pyramid.clouds(config.backbone.fine_stage - 1)
+    moved = apply_transform(points[1], want["in.transform"])
+    distance = torch.cdist(points[0].double(), moved.double(), compute_mode="donot_use_mm_for_euclid_dist")
+    inside = float(distance[distance < config.matching.matching_radius].max())
+    description["matching_radius"] = inside - 2e-6
+    (tmp_path / "made.json").write_text(json.dumps(description))
+    recording = read_recording(tmp_path / "made")
+    targets = compute_targets(recording.batch.pyramid, want["in.transform"], recording.config)
+    forgiven = pairs_at_radius(recording, targets)
+    assert forgiven, "the radius was moved onto no patch's points"
+    assert main([str(tmp_path / "made")]) == 0
+    counted = next(line for line in capsys.readouterr().out.splitlines() if "forgiven" in line)
+    assert f"{len(forgiven):.2e}" in counted
+    # An overlap that is off by more than those points explain is not forgiven, nor one that no such point explains.
+    for step in (1, -1):
+        with np.load(tmp_path / "made.npz") as arrays:
+            values = dict(arrays)
+        pairs = [tuple(pair) for pair in values["out.gt_node_corr_indices"].tolist()]
+        chosen = [(pair in forgiven) == (step == 1) for pair in pairs].index(True)
+        values["out.gt_node_corr_overlaps"][chosen] += 2.0 * max(forgiven.values()) + 0.01
+        np.savez(tmp_path / "spoiled.npz", **values)
+        for name in ("spoiled.json", "spoiled_weights.npz"):
+            (tmp_path / name).write_bytes((tmp_path / name.replace("spoiled", "made")).read_bytes())
+        assert main([str(tmp_path / "spoiled")]) == 1

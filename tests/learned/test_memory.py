@@ -45,7 +45,7 @@ def test_the_estimate_is_near_and_not_below() -> None:
         command, check=True, capture_output=True, text=True, env={**os.environ, **at_once}
     ).stdout
     real, estimate = map(float, printed.split())
-    assert real <= estimate - memory._SLACK <= 1.25 * real
+    assert real <= estimate - memory.SLACK <= 1.25 * real
 
 
 def test_too_large_a_pair_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,0 +1,71 @@
+# SPDX-License-Identifier: MIT
+"""CoFiNet's two losses, and how good the answers are."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor
+
+from hybridreg.learned.cofinet.config import CofinetLossConfig
+from hybridreg.learned.cofinet.targets import CofinetTargets
+from hybridreg.learned.cofinet.transport import either_best
+
+_FOUND = 0.1
+
+
+@dataclass(frozen=True, kw_only=True)
+class CofinetLosses:
+    """The parts of the training loss, and two measures of the answers."""
+
+    coarse: Tensor
+    fine: Tensor
+    total: Tensor  # with the configuration's weights
+    # As published, and no share: true pairs of superpoints above 0.1, by the sum of all weights, the slack's included.
+    # A perfect answer may have less or more than 1.
+    coarse_recall: Tensor
+    # Share of the true ones among a pair's matches, mean over the drawn pairs; a pair without matches counts as 0.
+    fine_precision: Tensor
+
+
+def cofinet_losses(
+    coarse: Tensor, fine: Tensor, targets: CofinetTargets, config: CofinetLossConfig
+) -> CofinetLosses:
+    """Losses of a pair, ready for ``backward``; finite for pairs without overlap too.
+
+    Parameters
+    ----------
+    coarse
+        (n + 1, m + 1) log-assignment of the superpoints.
+    fine
+        (B, P + 1, P + 1) of the points of the drawn pairs.
+    """
+    parts = transport_loss(coarse, targets.coarse), transport_loss(fine, targets.fine)
+    return CofinetLosses(
+        coarse=parts[0],
+        fine=parts[1],
+        total=config.coarse_weight * parts[0] + config.fine_weight * parts[1],
+        coarse_recall=coarse_recall(coarse.detach(), targets.coarse),
+        fine_precision=fine_precision(fine.detach(), targets.fine),
+    )
+
+
+def transport_loss(log_assignment: Tensor, weights: Tensor) -> Tensor:
+    """Mean of the negative log-assignment with the weights of the truth, the slack included."""
+    return -(log_assignment * weights).sum() / weights.sum().clamp_min(1e-9)
+
+
+def coarse_recall(log_assignment: Tensor, weights: Tensor) -> Tensor:
+    """True pairs with a probability above 0.1, by the sum of all weights."""
+    found = (log_assignment.exp() > _FOUND) & (weights > 0)
+    return found[:-1, :-1].sum() / weights.sum().clamp_min(1e-9)
+
+
+def fine_precision(log_assignment: Tensor, truth: Tensor) -> Tensor:
+    """Share of the true ones among the matches of each pair, mean over the pairs."""
+    if len(truth) == 0:
+        return torch.zeros((), device=truth.device)
+    chosen = either_best(log_assignment)
+    right = (chosen & (truth[:, :-1, :-1] > 0)).sum((1, 2))
+    return (right / chosen.sum((1, 2)).clamp_min(1)).mean()

@@ -1,0 +1,24 @@
+# SPDX-License-Identifier: MIT
+"""How our tensors are called in CoFiNet's published checkpoints."""
+
+from __future__ import annotations
+
+import re
+
+from hybridreg.learned.kpfcnn_names import attention_name, block_name
+
+# In every checkpoint, and read by no computation.
+UNUSED = ("l_bin_score", "encoder.epsilon")
+_BLOCKS = ("sattn1", "cattn", "sattn2")
+
+
+def official_name(name: str) -> str:
+    """The checkpoint's name of one tensor of our state dict."""
+    part, _, rest = name.partition(".")
+    if part in ("coarse", "fine"):
+        prefix = "l_" if part == "fine" else ""
+        rest = re.sub(r"^blocks\.(\d)\.layer", lambda match: _BLOCKS[int(match[1])], rest)
+        return attention_name(prefix + re.sub(r"^project\.", "final_proj.", rest))
+    if part in ("encoder", "decoder"):
+        return f"{part}.{block_name(name)}"
+    return re.sub(r"^bottleneck\.", "encoder.bottle.", name)

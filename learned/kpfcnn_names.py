@@ -1,0 +1,98 @@
+# SPDX-License-Identifier: MIT
+"""How the parts that Predator and CoFiNet share are called in their checkpoints."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable, Collection, Mapping
+
+from torch import Tensor, nn
+
+from hybridreg.learned.weights import load_official_tensors
+
+_BLOCKS = (
+    (r"\bencoder\.blocks\.", "encoder_blocks."),
+    (r"\bdecoder\.blocks\.", "decoder_blocks."),
+    (r"\.conv\.kernel$", ".KPConv.kernel_points"),
+    (r"\.conv\.weights$", ".KPConv.weights"),
+    (r"\.unary_in\.linear\.", ".unary1.mlp."),
+    (r"\.unary_out\.linear\.", ".unary2.mlp."),
+    (r"\.unary_shortcut\.linear\.", ".unary_shortcut.mlp."),
+    (r"(decoder_blocks\.\d+)\.(?:linear\.)?weight$", r"\1.mlp.weight"),
+)
+_ATTENTION = (
+    (r"\.attention\.query\.", ".attn.proj.0."),
+    (r"\.attention\.key\.", ".attn.proj.1."),
+    (r"\.attention\.value\.", ".attn.proj.2."),
+    (r"\.attention\.merge\.", ".attn.merge."),
+    (r"\.expand\.", ".mlp.0."),
+    (r"\.squeeze\.", ".mlp.3."),  # 1 and 2 are the normalisation and the ReLU
+)
+
+
+def block_name(name: str) -> str:
+    """The checkpoint's name of a tensor of encoder or decoder."""
+    return _renamed(name, _BLOCKS)
+
+
+def attention_name(name: str) -> str:
+    """The checkpoint's name of a tensor of a message layer."""
+    return _renamed(name, _ATTENTION)
+
+
+def load_stacked(
+    network: nn.Module,
+    tensors: Mapping[str, Tensor],
+    origin: str,
+    naming: Callable[[str], str],
+    unused: Collection[str] = (),
+) -> None:
+    """Load tensors that bear a checkpoint's names, strictly.
+
+    Parameters
+    ----------
+    naming
+        Gives the checkpoint's name for ours. Where we have a linear layer, its 1x1 convolution is taken too.
+    unused
+        Names that a checkpoint has and no computation reads: they may be there, and are left aside.
+
+    Raises
+    ------
+    ValueError
+        A tensor is missing, superfluous, of another shape or not finite: it is named.
+    """
+    shapes = {naming(name): tensor.shape for name, tensor in network.state_dict().items()}
+
+    def linear(name: str, tensor: Tensor) -> Tensor:
+        shape = shapes.get(name, tensor.shape)
+        convolution = tensor.shape[: len(shape)] == shape and tensor.numel() == shape.numel()
+        return tensor.reshape(shape) if convolution else tensor
+
+    kept = {name: linear(name, tensor) for name, tensor in tensors.items() if name not in unused}
+    load_official_tensors(network, kept, origin, naming)
+
+
+def nearest_config(tensors: Mapping[str, Tensor], key: str, radii: Mapping[str, float], origin: str) -> str:
+    """Which of several configurations has the search radius (m) that a layer's kernel points tell.
+
+    Kernel points lie within the radius, the outer ones at two thirds of it; published radii differ by a factor of 20.
+
+    Raises
+    ------
+    ValueError
+        The checkpoint has no such tensor.
+    """
+    points = tensors.get(key)
+    if points is None:
+        raise ValueError(f"{origin}: tensor {key} is missing")
+    reach = float(points.double().norm(dim=-1).max())
+    if not 0.0 < reach < math.inf:
+        raise ValueError(f"{origin}: tensor {key} holds no kernel points: the farthest lies at {reach} m")
+    return min(radii, key=lambda name: abs(math.log(radii[name] / reach)))
+
+
+def _renamed(name: str, rules: tuple[tuple[str, str], ...]) -> str:
+    for pattern, replacement in rules:
+        name = re.sub(pattern, replacement, name)
+    return name

@@ -1,0 +1,2 @@
+# SPDX-License-Identifier: MIT
+"""Predator (Huang et al. 2021): features, overlap and saliency of a pair's points."""
