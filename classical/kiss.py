@@ -96,7 +96,8 @@ class KissMatcher(Stage):
             if len(found_source) < _FEWEST_MATCHES:
                 return None
             solution = matcher.prune_and_solve(found_source, found_target)
-        if not solution.valid:
+        # `valid` (1.0.2) says that there was something to solve; a pose of fewer inliers is any pose at all.
+        if not solution.valid or matcher.get_num_final_inliers() < _FEWEST_MATCHES:
             return None
         T = np.eye(4)
         T[:3, :3], T[:3, 3] = solution.rotation, np.ravel(solution.translation)
