@@ -3,8 +3,9 @@
 
 Each preset runs alone, with one and with three neighbours that never rest, on one core that it shares with one of them,
 and four times at once beside one. The neighbours tell what a thread that never rests gets of a core in those very
-seconds, whoever else uses the machine (this process does just before and after one that runs alone); a registration that gets as much takes its work divided by that. Its work is the
-least processor time that any build took alone. The builds take turns, in processes that have warmed up.
+seconds, whoever else uses the machine; for one that runs alone, this process finds out just before and after. A
+registration that gets as much takes its work divided by that: the fair share. Its work is the least processor time that
+any build took alone. The builds take turns, in processes that have warmed up.
 
     python -m benchmarks.contention --data ../shared/data/real --before ../an/older/checkout
 

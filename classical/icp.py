@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from hybridreg import limits, se3
 from hybridreg import normals as surface
-from hybridreg.matches import Pose
 from hybridreg.cores import n_threads
+from hybridreg.matches import Pose
 from hybridreg.scene import Scene
 from hybridreg.stage import Stage
 

@@ -12,9 +12,9 @@ from scipy.spatial import cKDTree
 
 from hybridreg import limits
 from hybridreg.cloud import PointCloud
+from hybridreg.cores import n_threads
 from hybridreg.gate import MIN_POINTS
 from hybridreg.pair import Pair
-from hybridreg.cores import n_threads
 from hybridreg.scene import Level, Scene
 from hybridreg.stage import Stage
 

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Worker processes in a process that was itself forked or started by multiprocessing.
 
-joblib's loky (1.6) keeps its workers for the next call. A forked process would wait for ever for those of its parent, and
-one of multiprocessing's waits at its end until its own have been idle for five minutes.
+joblib's loky (1.6) keeps its workers for the next call. A forked process would wait for ever for those of its parent,
+and one of multiprocessing's waits at its end until its own have been idle for five minutes.
 """
 
 from __future__ import annotations

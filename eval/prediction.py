@@ -16,8 +16,8 @@ from hybridreg.eval.controls import Control
 from hybridreg.eval.own_workers import own_workers
 from hybridreg.eval.row import Row
 from hybridreg.eval.store import Appender
-from hybridreg.threads import one_thread
 from hybridreg.pair import LabelledPair
+from hybridreg.threads import one_thread
 
 
 def predict(
@@ -43,10 +43,11 @@ def predict(
     seed : int
         With a pair's id it fixes all randomness, so that neither order nor workers change a row.
     workers : int or None
-        Processes, each with one thread; pairs at a time where another backend runs them. None takes what `joblib.parallel_config` says, else 1: under
-        `joblib.parallel_config(backend="dask")` the pairs spread over a cluster, and those of a lost machine
-        are done by the others. A pair that kills its process is a failed row with two or more workers; with
-        one it takes this process along, and on dask joblib (1.6) waits for it for ever.
+        Processes, each with one thread; pairs at a time where another backend runs them. None takes what
+        `joblib.parallel_config` says, else 1: under `joblib.parallel_config(backend="dask")` the pairs spread
+        over a cluster, and those of a lost machine are done by the others. A pair that kills its process is a
+        failed row with two or more workers; with one it takes this process along, and on dask joblib (1.6)
+        waits for it for ever.
     overwrite : bool
         Begin anew, whatever the file holds.
     data : str

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from hybridreg import se3
-from hybridreg.extent import bounds
 from hybridreg.cores import n_threads
+from hybridreg.extent import bounds
 
 Array = NDArray[np.float64]
 

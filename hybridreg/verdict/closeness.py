@@ -17,8 +17,8 @@ from scipy.spatial import cKDTree
 
 from hybridreg import se3
 from hybridreg.cloud import PointCloud
-from hybridreg.extent import bounds, reach
 from hybridreg.cores import n_threads
+from hybridreg.extent import bounds, reach
 from hybridreg.scene import Scene
 from hybridreg.verdict.settle import descend
 

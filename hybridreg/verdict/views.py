@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from hybridreg import ground, normals
+from hybridreg.cores import n_threads
 from hybridreg.ground import Ground
 from hybridreg.range_image import RangeImage, RangeImages
 from hybridreg.resolution import default_voxel, map_cell
-from hybridreg.cores import n_threads
 from hybridreg.scene import Level, Scene, centre
 from hybridreg.verdict.axes import balanced
 from hybridreg.verdict.relief import Relief
