@@ -2,8 +2,8 @@
 """Hold outside code to the calling thread: on a busy machine, in a forked process, for the same bits everywhere.
 
 Threads of OpenMP, BLAS and torch wait for each other by spinning, many times in one call. Where a neighbour takes a
-core away they wait for the scheduler each time: the network of the preset `cross3dreg` took 5 to 8 s on two threads and 1 s
-on one (two cores, three busy neighbours), three times the processor's time. And those of OpenMP do not live on in a
+core away they wait for the scheduler each time: the network of the preset `cross3dreg` took 5 to 8 s on two threads and
+1 s on one (two cores, three busy neighbours), three times the processor's time. And those of OpenMP do not live on in a
 forked process, which then waits for them for ever.
 """
 
