@@ -79,7 +79,7 @@ class Gicp(Stage):
             if rests and not last:
                 continue
             still = 1.0 if last else _COARSE
-            # One thread (`hybridreg.threads`); with more, the order of summation and so the last digits depend on the
+            # One thread (`hybridreg.threads`): with more, the order of summation and so the last digits depend on the
             # machine.
             found = small_gicp.align(
                 target,

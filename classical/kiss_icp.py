@@ -17,7 +17,7 @@ from hybridreg.wheels import load
 
 # The map drops points beyond this range; the target is one scan, nothing of it is to be dropped.
 _EVERYTHING = 1e6
-# KISS-ICP's density (its `max_points_per_voxel`, `voxel_size` and two rounds of sampling; config, pipeline of 1.3.0).
+# KISS-ICP's density: `max_points_per_voxel` of its configuration and the two samplings of its pipeline (1.3.0).
 _POINTS_PER_VOXEL, _MAP_SAMPLING, _SOURCE_SAMPLING = 20, 0.5, 1.5
 _REACH = 3.0  # sigmas
 

@@ -105,3 +105,21 @@ def test_forty_calls_give_the_same_bits() -> None:
     cores = os.sched_getaffinity(0)
     assert len({run(scene).T.tobytes() for _ in range(40)}) == 1
     assert os.sched_getaffinity(0) == cores
+
+
+@pytest.mark.parametrize(("inliers", "found"), [(0, False), (1, False), (2, False), (3, True)])
+def test_a_pose_of_fewer_than_three_inliers_is_none(
+    monkeypatch: pytest.MonkeyPatch, inliers: int, found: bool
+) -> None:
+    import kiss_matcher
+
+    class Few(kiss_matcher.KISSMatcher):  # type: ignore[misc]
+        """Finds what it finds, and says that so many matches agreed."""
+
+        def get_num_final_inliers(self) -> int:
+            return inliers
+
+    monkeypatch.setattr(kiss_matcher, "KISSMatcher", Few)
+    scene, _ = testing.sample_scene()
+    assert run(scene).found == found
+    assert any("found no pose" in note for note in scene.notes) != found
