@@ -94,6 +94,7 @@ def beside_a_thread(preset: str) -> None:
     import torch
 
     torch.set_num_threads(2)
+    said = os.environ.get("MKL_NUM_THREADS")
     inside, over = threading.Event(), threading.Event()
 
     def hold() -> None:
@@ -107,7 +108,7 @@ def beside_a_thread(preset: str) -> None:
     inside.wait()
     child = os.fork()
     if child == 0:
-        given_back = torch.get_num_threads() == 2 and "MKL_NUM_THREADS" not in os.environ
+        given_back = torch.get_num_threads() == 2 and os.environ.get("MKL_NUM_THREADS") == said
         _same(preset, expected)
         os._exit(0 if given_back else 3)
     status = _waited(child)
