@@ -189,7 +189,7 @@ def test_what_is_saved_comes_back(tmp_path: Path) -> None:
     again = RoitrNetwork.from_pretrained(tmp_path)
     assert again.config == network.config
     assert all(torch.equal(t, again.state_dict()[n]) for n, t in network.state_dict().items())
-    with pytest.raises(ValueError, match="is of the network 'roitr'"):
+    with pytest.raises(ValueError, match="holds weights of roitr"):
         today.from_pretrained(tmp_path)
     values = json.loads((tmp_path / "config.json").read_text())
     (tmp_path / "config.json").write_text(json.dumps({**values, "network": "vrhcf"}))
