@@ -6,6 +6,8 @@ from __future__ import annotations
 import os
 import signal
 import subprocess
+import time
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -49,7 +51,8 @@ def run_two(root: Path, out: str, *, rounds: int, workers: int, seed: int) -> Me
     for _ in range(rounds):
         before = killed.whole_lines(folder)
         pair = [_begun(root, out, workers, overwrite=False) for _ in range(2)]
-        texts = [_ended(process, float(rng.uniform(2.0, 6.0))) for process in pair]
+        _met(pair)
+        texts = [_ended(process, float(rng.uniform(0.5, 4.0))) for process in pair]
         for process, text in zip(pair, texts, strict=True):
             if process.returncode == 2:
                 assert _REFUSED in text, text
@@ -63,6 +66,13 @@ def run_two(root: Path, out: str, *, rounds: int, workers: int, seed: int) -> Me
         killed.compare(before, killed.whole_lines(folder))
     killed.run_whole(root, out, workers)
     return met
+
+
+def _met(pair: Sequence[subprocess.Popen[str]]) -> None:
+    # Until one of them ended, as whoever is refused does: to start takes a busy machine a while.
+    deadline = time.monotonic() + _LONGEST_SECONDS
+    while all(process.poll() is None for process in pair) and time.monotonic() < deadline:
+        time.sleep(0.05)
 
 
 def overwrite_is_refused(root: Path, out: str, workers: int) -> None:

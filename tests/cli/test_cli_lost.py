@@ -268,6 +268,8 @@ def test_a_tiny_shared_memory_means_one_process(batch: Path) -> None:
 
 
 def test_without_a_folder_for_temporary_files(finished: Path) -> None:
+    if Path("/tmp") in Path(__file__).resolve().parents or sys.prefix.startswith("/tmp/"):
+        pytest.skip("this checkout lies in /tmp, which is to be taken away")
     here = shutil.copytree(finished, Path("/var/tmp") / f"hybridreg-{os.getpid()}")
     try:
         mounts = (
