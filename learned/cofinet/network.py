@@ -12,8 +12,9 @@ from torch import Tensor, nn
 from torch.nn import functional as F
 
 from hybridreg.learned.batch import Batch
+from hybridreg.learned.checkpoints import read_checkpoint
 from hybridreg.learned.cofinet.attention import PairTransformer, scores
-from hybridreg.learned.cofinet.config import CofinetConfig, named_config
+from hybridreg.learned.cofinet.config import SIZES, CofinetConfig, named_config
 from hybridreg.learned.cofinet.losses import CofinetLosses, cofinet_losses
 from hybridreg.learned.cofinet.official_names import UNUSED, official_name
 from hybridreg.learned.cofinet.patching import PatchIndex, patch_index
@@ -21,12 +22,12 @@ from hybridreg.learned.cofinet.selection import NodePairs, Tried, select
 from hybridreg.learned.cofinet.targets import CofinetTargets
 from hybridreg.learned.cofinet.transport import MASKED, alternating_sinkhorn, either_best
 from hybridreg.learned.kpfcnn import KpfcnnDecoder, KpfcnnEncoder
-from hybridreg.learned.kpfcnn_names import load_stacked
 from hybridreg.learned.message_attention import Clouds, Masks
 from hybridreg.learned.point_matching import PointMatches
-from hybridreg.learned.pretrained import Pretrained, read_checkpoint
+from hybridreg.learned.pretrained import Pretrained
 from hybridreg.learned.sinkhorn import kernel_sinkhorn, log_sinkhorn
 from hybridreg.learned.stacked_memory import encoder_bytes
+from hybridreg.learned.weights import load_official_tensors
 
 _FLOAT = 4
 # Pairs of patches worked on at a time: the attention of so many stays small.
@@ -64,7 +65,7 @@ class CofinetOutput:
     matches: PointMatches
 
 
-class CofinetNetwork(Pretrained, nn.Module):
+class CofinetNetwork(Pretrained):
     """Features and matches of a pair. No part of it takes a ground truth.
 
     Exchanging source and target changes the numbers: the source attends first, and each transport normalises its rows
@@ -80,6 +81,7 @@ class CofinetNetwork(Pretrained, nn.Module):
 
     name: ClassVar[str] = "cofinet"
     config_type: ClassVar[type] = CofinetConfig
+    sizes: ClassVar[tuple[str, ...]] = tuple(SIZES)
     named_config = staticmethod(named_config)
 
     def __init__(self, config: CofinetConfig, seed: int = 0) -> None:
@@ -200,7 +202,7 @@ class CofinetNetwork(Pretrained, nn.Module):
 
     @classmethod
     def load_official(
-        cls, path: str | os.PathLike[str], config: CofinetConfig | str | None = None
+        cls, path: str | os.PathLike[str], size: CofinetConfig | str | None = None
     ) -> CofinetNetwork:
         """The network of a published checkpoint, in evaluation mode.
 
@@ -208,7 +210,7 @@ class CofinetNetwork(Pretrained, nn.Module):
         ----------
         path
             A ``.pth`` as published, or a bare state dict saved by ``torch.save``. Read with ``weights_only``.
-        config
+        size
             A configuration or its name, by default ``cofinet-kitti``. Published weights need ``padding="point0"``,
             which that one has.
 
@@ -218,7 +220,7 @@ class CofinetNetwork(Pretrained, nn.Module):
             No such file; not a checkpoint of this network, with the wrong tensor named.
         """
         tensors = read_checkpoint(path).tensors
-        config = config or "cofinet-kitti"
-        network = cls(named_config(config) if isinstance(config, str) else config)
-        load_stacked(network, tensors, str(path), official_name, UNUSED)
+        size = size or "cofinet-kitti"
+        network = cls(named_config(size) if isinstance(size, str) else size)
+        load_official_tensors(network, tensors, str(path), official_name, UNUSED)
         return network.eval()

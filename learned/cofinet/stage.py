@@ -16,7 +16,7 @@ from hybridreg.scene import Level, Scene
 if TYPE_CHECKING:
     from torch import Tensor
 
-    from hybridreg.learned.cofinet.network import CofinetCloud, CofinetEncoding, CofinetNetwork
+    from hybridreg.learned.cofinet.network import CofinetCloud, CofinetEncoding
     from hybridreg.learned.cofinet.selection import NodePairs
 
 # An overlap that leaves fewer superpoints of a cloud than this is taken to be wrong, and ignored.
@@ -24,7 +24,7 @@ _FEWEST = 4
 
 
 @dataclass(frozen=True, kw_only=True)
-class Cofinet(StackedStage):
+class Cofinet(StackedStage["CofinetNetwork"]):
     """Superpoints matched by optimal transport, then the points around them (Yu et al. 2021).
 
     Parameters
@@ -58,9 +58,8 @@ class Cofinet(StackedStage):
 
         from hybridreg.learned.stages.arrays import array
         from hybridreg.learned.stages.drawing import draw
-        from hybridreg.learned.stages.encoding import note_random
 
-        note_random(scene, self)
+        self.note_random(scene)
         network = self.network()
         encoding = scene.shared(("encoding", self.network_name()), lambda: self._encode(scene))
         with torch.inference_mode():
@@ -73,10 +72,6 @@ class Cofinet(StackedStage):
             group=found.group.cpu().numpy()[rows],
             spacing=network.config.backbone.voxel,
         )
-
-    def network(self) -> CofinetNetwork:  # type: ignore[override]
-        """The network in evaluation mode, read when it is first asked for; errors as `from_pretrained`."""
-        return super().network()  # type: ignore[return-value]
 
     def _encode(self, scene: Scene) -> CofinetEncoding:
         import torch

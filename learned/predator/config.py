@@ -99,14 +99,12 @@ class PredatorConfig:
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values that `from_dict` and JSON take back."""
-        return {"network": "predator", **dataclasses.asdict(self)}
+        return dataclasses.asdict(self)
 
     @staticmethod
     def from_dict(values: Mapping[str, Any]) -> PredatorConfig:
         """Build from plain values; an unknown key raises ``ValueError`` that names it."""
-        return build(
-            PredatorConfig, {key: value for key, value in values.items() if key != "network"}, "config"
-        )
+        return build(PredatorConfig, values, "config")
 
 
 def _indoor() -> PredatorConfig:
@@ -143,7 +141,7 @@ def _nano() -> PredatorConfig:
     return PredatorConfig(backbone=backbone, graph=GraphConfig(dim=32), final_dim=16, loss=_scaled(0.5))
 
 
-_SIZES = {"predator-kitti": PredatorConfig, "predator-3dmatch": _indoor, "small": _small, "nano": _nano}
+SIZES = {"predator-kitti": PredatorConfig, "predator-3dmatch": _indoor, "small": _small, "nano": _nano}
 
 
 def named_config(name: str) -> PredatorConfig:
@@ -154,6 +152,6 @@ def named_config(name: str) -> PredatorConfig:
     KeyError
         An unknown name; the message lists the known ones.
     """
-    if name not in _SIZES:
-        raise KeyError(f"unknown size {name!r} of Predator; known are {', '.join(_SIZES)}")
-    return _SIZES[name]()
+    if name not in SIZES:
+        raise KeyError(f"unknown size {name!r} of Predator; known are {', '.join(SIZES)}")
+    return SIZES[name]()

@@ -4,16 +4,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 from hybridreg.learned.stages.dense_matching import DensePoints, match_dense, unit
 from hybridreg.learned.stages.network_stage import NetworkStage
 from hybridreg.matches import Correspondences, Overlap
 from hybridreg.scene import Scene
 
+if TYPE_CHECKING:
+    pass
+
 
 @dataclass(frozen=True, kw_only=True)
-class DenseFeatures(NetworkStage):
+class DenseFeatures(NetworkStage["RegistrationNetwork"]):
     """Pair the fine points whose features are each other's nearest, as FCGF does (Choy et al. 2019).
 
     No transformer takes part: a backbone that the contrastive warm-up has trained (specification 10.1) is enough,
@@ -27,7 +30,6 @@ class DenseFeatures(NetworkStage):
 
     min_overlap: float = 0.5
 
-    image: ClassVar[bool] = False
     gives: ClassVar[frozenset[str]] = frozenset({"matches"})
     parts: ClassVar[frozenset[str]] = frozenset({"backbone"})
 

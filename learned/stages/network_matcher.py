@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, kw_only=True)
-class NetworkMatcher(NetworkStage):
+class NetworkMatcher(NetworkStage["RegistrationNetwork"]):
     """Match superpoints, then the points around them.
 
     Parameters

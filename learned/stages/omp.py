@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Omp(NetworkStage):
+class Omp(NetworkStage["RegistrationNetwork"]):
     """Which points does the other cloud share, judged by superpoint features and the image (Cross3DReg, 3.2).
 
     Each point takes the probability of its superpoint, so that any matcher can use it. A matcher of the same
@@ -23,6 +23,7 @@ class Omp(NetworkStage):
     nothing, and every point counts.
     """
 
+    image: ClassVar[bool] = True
     parts: ClassVar[frozenset[str]] = frozenset({"backbone", "omp"})
 
     def __call__(self, scene: Scene) -> Overlap:

@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING, ClassVar, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from hybridreg.learned.stages.own_network_stage import OwnNetworkStage, on_grid
+from hybridreg.learned.stages.network_grid import on_grid
+from hybridreg.learned.stages.network_stage import NetworkStage
 from hybridreg.matches import Correspondences, Overlap
 from hybridreg.scene import Level, Scene
 
 if TYPE_CHECKING:
     from hybridreg.learned.vrhcf.config import SphereNetConfig
-    from hybridreg.learned.vrhcf.network import SphereNet
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.int64]
@@ -30,7 +30,7 @@ _MOST, _FEWEST = 5_000, 100
 
 
 @dataclass(frozen=True, kw_only=True)
-class Vrhcf(OwnNetworkStage):
+class Vrhcf(NetworkStage["SphereNet"]):
     """Spherical descriptors of single keypoints, nearest partners in one direction (Zhao et al., ICME 2024).
 
     With the estimator "hcf" this is VRHCF. The published descriptor takes 2.9 G multiply-adds a keypoint, a thousand
@@ -55,7 +55,7 @@ class Vrhcf(OwnNetworkStage):
     matching: Literal["channels", "unit"] | None = None
     mutual: bool = False
 
-    NETWORK: ClassVar[str] = "hybridreg.learned.vrhcf.network:SphereNet"
+    kind: ClassVar[str] = "vrhcf"
     gives: ClassVar[frozenset[str]] = frozenset({"matches"})
     parts: ClassVar[frozenset[str]] = frozenset({"layers"})
 
@@ -73,11 +73,12 @@ class Vrhcf(OwnNetworkStage):
     def __call__(self, scene: Scene, overlap: Overlap) -> Correspondences:
         import torch
 
+        from hybridreg.learned.memory import require_bytes
         from hybridreg.learned.stages.arrays import array
         from hybridreg.learned.vrhcf.batch import make_batch
         from hybridreg.learned.vrhcf.matching import match_descriptors
 
-        network: SphereNet = self.network()  # type: ignore[assignment]
+        network = self.network()
         self.note_random(scene)
         config = network.config
         clouds = on_grid(scene, config.voxel)
@@ -88,7 +89,8 @@ class Vrhcf(OwnNetworkStage):
         seen_from = [_place(level, config.facing) for _, level in levels]
         moved = [points - place for points, place in zip(clouds, seen_from, strict=True)]
         batch = make_batch(moved[0], moved[1], config, keypoints=(rows[0], rows[1]), device=self.device)
-        _require_memory(network.memory(batch), [len(r) for r in rows], self.device)
+        described = (len(rows[0]), len(rows[1]))
+        require_bytes(network.memory(batch), described, self.device, "set max_keypoints to less")
         matching = self.matching or config.matching
         with torch.inference_mode():
             output = network(batch)
@@ -146,14 +148,3 @@ def _place(level: Level, facing: str) -> Array:
         above: Array = np.median(level.points, axis=0) + [0.0, 0.0, _ABOVE]
         return above
     return level.viewpoint if level.viewpoint.ndim == 1 else level.viewpoint.mean(axis=0)
-
-
-def _require_memory(needed: int, keypoints: list[int], device: str) -> None:
-    from hybridreg.learned.memory import available_bytes
-
-    free = available_bytes(device)
-    if free is not None and needed > free:
-        raise ValueError(
-            f"SphereNet would take about {needed / 1e9:.2g} GB for {keypoints[0]} target and {keypoints[1]} source "
-            f"keypoints, and {free / 1e9:.2g} GB are free: set max_keypoints to less"
-        )

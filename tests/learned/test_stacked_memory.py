@@ -20,7 +20,7 @@ from hybridreg.learned.predator.network import PredatorNetwork
 _MEASURE = """
 import sys, numpy as np, torch
 from hybridreg.learned.batch import make_batch
-from hybridreg.learned.pretrained import network_class
+from hybridreg.learned.network_table import network_class
 from hybridreg.resources import peak_memory_mb, reset_peak_memory
 cls = network_class(sys.argv[1])
 config = cls.named_config("nano")

@@ -105,7 +105,7 @@ def test_a_published_checkpoint_is_a_stage(trained: str, scene: Scene, tmp_path:
         hr.Fcgf(weights=str(tmp_path / "fcgf.pth")).network()
     with pytest.raises(ValueError, match=r"normalize=True: the weights .* bring their own configuration"):
         hr.Fcgf(weights=trained, normalize=True).network()
-    with pytest.raises(ValueError, match=r"size='small': the weights .* tell their own"):
+    with pytest.raises(ValueError, match=r"size='small': the weights .* bring their own"):
         hr.Fcgf(weights=trained, size="small").network()
 
 
@@ -168,4 +168,4 @@ def test_the_estimate_of_memory_is_near_and_not_below() -> None:
     ).stdout
     real, estimate = map(float, printed.split())
     assert real <= estimate
-    assert estimate - memory._SLACK <= 1.4 * real
+    assert estimate - memory.SLACK <= 1.4 * real

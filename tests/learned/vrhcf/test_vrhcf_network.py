@@ -16,7 +16,7 @@ import torch
 from streets import moved, street, yaw
 
 from hybridreg.learned.vrhcf.config import ShellConv, SphereNetConfig, SurfaceConv, named_config
-from hybridreg.learned.vrhcf.cost import _SLACK, multiply_adds
+from hybridreg.learned.vrhcf.cost import SLACK, multiply_adds
 from hybridreg.learned.vrhcf.losses import hardest_in_batch
 from hybridreg.learned.vrhcf.matching import match_descriptors
 from hybridreg.learned.vrhcf.network import SphereNet, pad_sphere
@@ -122,7 +122,7 @@ def test_matching_as_released_lets_long_descriptors_win() -> None:
 
 def test_sizes_by_name() -> None:
     assert sum(p.numel() for p in SphereNet.named("small").parameters()) <= 3_000_000
-    published = SphereNet.named("3dmatch")
+    published = SphereNet.named("vrhcf-3dmatch")
     assert sum(p.numel() for p in published.parameters()) == 2_241_104 - 128  # less what nothing reads
     assert multiply_adds(published.config) == pytest.approx(2.88e9, rel=2e-3)
     assert (published.config.padding, published.config.frames, published.config.matching) == (
@@ -130,7 +130,7 @@ def test_sizes_by_name() -> None:
         "released",
         "channels",
     )
-    with pytest.raises(KeyError, match="known are nano, small, 3dmatch"):
+    with pytest.raises(KeyError, match="known are nano, small, vrhcf-3dmatch"):
         named_config("full")
 
 
@@ -158,13 +158,13 @@ def official(network: SphereNet) -> dict[str, torch.Tensor]:
 
 
 def test_a_checkpoint_of_the_authors_loads_strictly(tmp_path: Path) -> None:
-    network = made(named_config("3dmatch"), seed=3)
+    network = made(named_config("vrhcf-3dmatch"), seed=3)
     state = official(network)
     torch.save(state, tmp_path / "3DMatch_best.pkl")
     loaded = SphereNet.load_official(tmp_path / "3DMatch_best.pkl")
     assert all(torch.equal(t, loaded.state_dict()[n]) for n, t in network.state_dict().items())
     assert loaded.config.padding == "released"
-    right = dataclasses.replace(named_config("3dmatch"), padding="right")
+    right = dataclasses.replace(named_config("vrhcf-3dmatch"), padding="right")
     assert SphereNet.load_official(tmp_path / "3DMatch_best.pkl", right).config.padding == "right"
     for change, message in (
         (lambda s: s.pop("module.xyz_raising.bias"), "xyz_raising.bias is missing"),
@@ -222,7 +222,7 @@ def test_the_memory_estimate_is_not_below() -> None:
         command, check=True, capture_output=True, text=True, env={**os.environ, **at_once}
     ).stdout
     real, estimate = map(float, printed.split())
-    assert real <= estimate <= 3.0 * real + 2 * _SLACK
+    assert real <= estimate <= 3.0 * real + 2 * SLACK
 
 
 @pytest.mark.skipif(not torch.cuda.is_available(), reason="no GPU here")
