@@ -185,4 +185,4 @@ def test_the_estimate_of_memory_is_near_and_not_below() -> None:
     ).stdout
     real, estimate = map(float, printed.split())
     assert real <= estimate
-    assert estimate - memory._SLACK <= 1.5 * real, (real, estimate)
+    assert estimate - memory.SLACK <= 1.5 * real, (real, estimate)
