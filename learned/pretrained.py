@@ -42,7 +42,7 @@ class Pretrained(nn.Module):
     @classmethod
     def named(cls, size: str, **parts: Any) -> Self:
         """A network of random weights of a size by name; ``KeyError`` lists the known ones."""
-        return cls(cls.named_config(size, **parts))  # type: ignore[call-arg]
+        return cls(cls.named_config(size, **parts))
 
     @classmethod
     @abstractmethod

@@ -76,7 +76,7 @@ def from_pretrained(name_or_folder: str | os.PathLike[str], wanted: str | None =
         tensors = load_file(folder / WEIGHTS_FILE)
     except SafetensorError as error:
         raise ValueError(f"{folder / WEIGHTS_FILE} is damaged: {error}") from error
-    network: Pretrained = cls(config)  # type: ignore[call-arg]
+    network = cls(config)
     load_tensors(network, tensors, str(folder / WEIGHTS_FILE))
     return network.eval()
 

@@ -16,7 +16,7 @@ from hybridreg.scene import Level, Scene
 if TYPE_CHECKING:
     from torch import Tensor
 
-    from hybridreg.learned.cofinet.network import CofinetCloud, CofinetEncoding
+    from hybridreg.learned.cofinet.network import CofinetCloud, CofinetEncoding, CofinetNetwork
     from hybridreg.learned.cofinet.selection import NodePairs
 
 # An overlap that leaves fewer superpoints of a cloud than this is taken to be wrong, and ignored.
@@ -24,7 +24,7 @@ _FEWEST = 4
 
 
 @dataclass(frozen=True, kw_only=True)
-class Cofinet(StackedStage["CofinetNetwork"]):
+class Cofinet(StackedStage):
     """Superpoints matched by optimal transport, then the points around them (Yu et al. 2021).
 
     Parameters
@@ -60,7 +60,7 @@ class Cofinet(StackedStage["CofinetNetwork"]):
         from hybridreg.learned.stages.drawing import draw
 
         self.note_random(scene)
-        network = self.network()
+        network: CofinetNetwork = self.network()
         encoding = scene.shared(("encoding", self.network_name()), lambda: self._encode(scene))
         with torch.inference_mode():
             found = network.match_points(encoding, self._nodes(scene, overlap, encoding))

@@ -12,11 +12,13 @@ from hybridreg.matches import Correspondences, Overlap
 from hybridreg.scene import Scene
 
 if TYPE_CHECKING:
+    from hybridreg.learned.fcgf.network import FcgfNetwork
+
     pass
 
 
 @dataclass(frozen=True, kw_only=True)
-class Fcgf(NetworkStage["FcgfNetwork"]):
+class Fcgf(NetworkStage):
     """Pair each voxel of the source with the target's voxel of the nearest feature (Choy et al. 2019).
 
     The network looks at the clouds on its own grid, anchored at each cloud's origin; the points that are matched are
@@ -56,7 +58,7 @@ class Fcgf(NetworkStage["FcgfNetwork"]):
         from hybridreg.learned.stages.arrays import array
         from hybridreg.learned.stages.network_grid import note_grid
 
-        network = self.network()
+        network: FcgfNetwork = self.network()
         voxel = network.config.voxel
         self.note_random(scene)
         note_grid(scene, voxel)

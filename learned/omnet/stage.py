@@ -14,11 +14,13 @@ from hybridreg.matches import Correspondences, Pose
 from hybridreg.scene import Scene, centre
 
 if TYPE_CHECKING:
+    from hybridreg.learned.omnet.network import OmnetNetwork
+
     pass
 
 
 @dataclass(frozen=True, kw_only=True)
-class OmNet(NetworkStage["OmnetNetwork"]):
+class OmNet(NetworkStage):
     """Regress the pose from the clouds alone, four times over, on the points that overlap (Xu et al. 2021).
 
     Looks at a random choice of the levels' points (as many of each as its configuration says), each cloud about the
@@ -48,7 +50,7 @@ class OmNet(NetworkStage["OmnetNetwork"]):
         from hybridreg.learned.omnet.batch import make_batch
         from hybridreg.learned.stages.arrays import array
 
-        network = self.network()
+        network: OmnetNetwork = self.network()
         self.note_random(scene)
         levels = (scene.target, scene.source)
         points = self.points or network.config.points

@@ -23,7 +23,7 @@ _FEWEST = 100
 
 
 @dataclass(frozen=True, kw_only=True)
-class _PredatorStage(StackedStage["PredatorNetwork"]):
+class _PredatorStage(StackedStage):
     kind: ClassVar[str] = "predator"
 
     def output(self, scene: Scene) -> PredatorOutput:

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from torch import Tensor
 
     from hybridreg.learned.encodings import CloudEncoding
+    from hybridreg.learned.roitr.network import RoitrNetwork
 
 Array = NDArray[np.float64]
 
@@ -26,7 +27,7 @@ _FEWEST = 4
 
 
 @dataclass(frozen=True, kw_only=True)
-class Roitr(NetworkStage["RoitrNetwork"]):
+class Roitr(NetworkStage):
     """Superpoints and points matched by features that no rotation changes (Yu et al., CVPR 2023).
 
     Needs oriented normals: they are estimated from 33 neighbours and turned to the frame's origin for the published
@@ -56,7 +57,7 @@ class Roitr(NetworkStage["RoitrNetwork"]):
         from hybridreg.learned.roitr.batch import make_batch
         from hybridreg.learned.stages.arrays import array
 
-        network = self.network()
+        network: RoitrNetwork = self.network()
         self.note_random(scene)
         config = network.config
         clouds = [

@@ -4,19 +4,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 from hybridreg.learned.stages.dense_matching import DensePoints, match_dense, unit
 from hybridreg.learned.stages.network_stage import NetworkStage
 from hybridreg.matches import Correspondences, Overlap
 from hybridreg.scene import Scene
 
-if TYPE_CHECKING:
-    pass
-
 
 @dataclass(frozen=True, kw_only=True)
-class DenseFeatures(NetworkStage["RegistrationNetwork"]):
+class DenseFeatures(NetworkStage):
     """Pair the fine points whose features are each other's nearest, as FCGF does (Choy et al. 2019).
 
     No transformer takes part: a backbone that the contrastive warm-up has trained (specification 10.1) is enough,

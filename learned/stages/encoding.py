@@ -18,17 +18,15 @@ from hybridreg.scene import Scene
 if TYPE_CHECKING:
     from hybridreg.learned.network import RegistrationNetwork
 
-    TodaysStage = NetworkStage[RegistrationNetwork]
 
-
-def encode(scene: Scene, stage: TodaysStage) -> Encoding:
+def encode(scene: Scene, stage: NetworkStage) -> Encoding:
     """The pair after the encoders of a stage's network."""
     stage.note_random(scene)
     return scene.shared(("encoding", stage.network_name()), lambda: _encode(scene, stage))
 
 
-def _encode(scene: Scene, stage: TodaysStage) -> Encoding:
-    network = stage.network()
+def _encode(scene: Scene, stage: NetworkStage) -> Encoding:
+    network: RegistrationNetwork = stage.network()
     if network.image_encoder is not None and not (stage.sees() and scene.pair.image is not None):
         why = "no image" if scene.pair.image is None else "the network was trained without images"
         scene.note(f"{why}: features come from the clouds alone, a learned token in the image's place")
@@ -43,14 +41,14 @@ def _encode(scene: Scene, stage: TodaysStage) -> Encoding:
         return max(as_given, levelled, key=likeness)
 
 
-def _encode_turned(scene: Scene, stage: TodaysStage, turns: Turns) -> Encoding:
+def _encode_turned(scene: Scene, stage: NetworkStage, turns: Turns) -> Encoding:
     batch = _batch(scene, stage, turns)
-    network = stage.network()
+    network: RegistrationNetwork = stage.network()
     require_memory(batch.pyramid, network.config)
     return turns.back(network.encode(batch))
 
 
-def _batch(scene: Scene, stage: TodaysStage, turns: Turns) -> Batch:
+def _batch(scene: Scene, stage: NetworkStage, turns: Turns) -> Batch:
     # A network's filters have the size of the voxel that it was trained with. Levels of that voxel are taken as
     # they are; others would show it a density that it never saw, so it makes its own from the clouds.
     config = stage.network().config

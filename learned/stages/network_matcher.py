@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, kw_only=True)
-class NetworkMatcher(NetworkStage["RegistrationNetwork"]):
+class NetworkMatcher(NetworkStage):
     """Match superpoints, then the points around them.
 
     Parameters
@@ -46,7 +46,8 @@ class NetworkMatcher(NetworkStage["RegistrationNetwork"]):
         from hybridreg.learned.stages.encoding import encode
         from hybridreg.learned.stages.kept_superpoints import keep
 
-        network, encoding = self.network(), encode(scene, self)
+        network: RegistrationNetwork = self.network()
+        encoding = encode(scene, self)
         with torch.inference_mode():
             kept = keep(scene, overlap, encoding, network.config, self.min_overlap)
             features = network.attend(encoding, kept)

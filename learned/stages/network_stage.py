@@ -5,22 +5,19 @@ from __future__ import annotations
 
 import os
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar, Generic, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from hybridreg.stage import Stage
 
 if TYPE_CHECKING:
     from typing_extensions import Self
 
-    from hybridreg.learned.pretrained import Pretrained
     from hybridreg.learned.stages.networks import Loaded, NetworkName
     from hybridreg.scene import Scene
 
-Network = TypeVar("Network", bound="Pretrained")
-
 
 @dataclass(frozen=True, kw_only=True)
-class NetworkStage(Stage, Generic[Network]):
+class NetworkStage(Stage):
     """A stage with a network behind it: the one that ``kind`` names in `hybridreg.learned.network_table`.
 
     Parameters
@@ -88,15 +85,15 @@ class NetworkStage(Stage, Generic[Network]):
         """Write the network's weights and configuration into a folder."""
         self.network().save_pretrained(folder)
 
-    def network(self) -> Network:
-        """The network in evaluation mode, read when it is first asked for.
+    def network(self) -> Any:
+        """The network in evaluation mode, of the class that ``kind`` stands for, read when it is first asked for.
 
         Raises
         ------
         ValueError
             As `from_pretrained`.
         """
-        network: Network = self._load().network  # type: ignore[assignment]
+        network = self._load().network
         self.check(network)
         random = self.random_parts()
         if random and not self.untrained:
@@ -137,5 +134,5 @@ class NetworkStage(Stage, Generic[Network]):
         """What a published checkpoint cannot tell, by the names that `load_official` of the network takes."""
         return ()
 
-    def check(self, network: Network) -> None:
+    def check(self, network: Any) -> None:
         """Refuse a network that lacks what this stage runs."""

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Omp(NetworkStage["RegistrationNetwork"]):
+class Omp(NetworkStage):
     """Which points does the other cloud share, judged by superpoint features and the image (Cross3DReg, 3.2).
 
     Each point takes the probability of its superpoint, so that any matcher can use it. A matcher of the same
@@ -33,7 +33,8 @@ class Omp(NetworkStage["RegistrationNetwork"]):
         from hybridreg.learned.stages.encoding import encode
         from hybridreg.learned.stages.spreading import spread
 
-        network, encoding = self.network(), encode(scene, self)
+        network: RegistrationNetwork = self.network()
+        encoding = encode(scene, self)
         with torch.inference_mode():
             logits = network.predict_overlap(encoding)
             assert logits is not None, "check() lets no network without OMP through"

@@ -6,7 +6,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from hybridreg.learned.stages.network_stage import Network, NetworkStage
+from hybridreg.learned.stages.network_stage import NetworkStage
 
 if TYPE_CHECKING:
     from hybridreg.learned.batch import Batch
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, kw_only=True)
-class StackedStage(NetworkStage[Network]):
+class StackedStage(NetworkStage):
     """A stage of a network that takes a `Batch`, with ``weights``, ``size``, ``device``, ``untrained`` as all have."""
 
     parts: ClassVar[frozenset[str]] = frozenset({"encoder"})

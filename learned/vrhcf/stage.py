@@ -17,6 +17,7 @@ from hybridreg.scene import Level, Scene
 
 if TYPE_CHECKING:
     from hybridreg.learned.vrhcf.config import SphereNetConfig
+    from hybridreg.learned.vrhcf.network import SphereNet
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.int64]
@@ -30,7 +31,7 @@ _MOST, _FEWEST = 5_000, 100
 
 
 @dataclass(frozen=True, kw_only=True)
-class Vrhcf(NetworkStage["SphereNet"]):
+class Vrhcf(NetworkStage):
     """Spherical descriptors of single keypoints, nearest partners in one direction (Zhao et al., ICME 2024).
 
     With the estimator "hcf" this is VRHCF. The published descriptor takes 2.9 G multiply-adds a keypoint, a thousand
@@ -78,7 +79,7 @@ class Vrhcf(NetworkStage["SphereNet"]):
         from hybridreg.learned.vrhcf.batch import make_batch
         from hybridreg.learned.vrhcf.matching import match_descriptors
 
-        network = self.network()
+        network: SphereNet = self.network()
         self.note_random(scene)
         config = network.config
         clouds = on_grid(scene, config.voxel)
