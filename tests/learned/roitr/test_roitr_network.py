@@ -5,8 +5,6 @@ from __future__ import annotations
 
 import dataclasses
 import json
-import os
-import subprocess
 import sys
 from pathlib import Path
 
@@ -14,6 +12,7 @@ import numpy as np
 import pytest
 import torch
 from bushes import bush
+from measured import peak_and_estimate
 
 from hybridreg import se3
 from hybridreg.learned.memory import SLACK
@@ -212,32 +211,18 @@ def test_adaptive_matching_takes_all_that_are_near_or_the_nearest() -> None:
     assert torch.allclose(few.score, few.score.sort(descending=True).values)
 
 
-_MEASURE = """
-import numpy as np, torch
+_MADE = """
 from hybridreg.learned.roitr.batch import make_batch
 from hybridreg.learned.roitr.network import RoitrNetwork
-from hybridreg.resources import peak_memory_mb, reset_peak_memory
-torch.set_num_threads(1)
-rng = np.random.default_rng(0)
-network = RoitrNetwork.named("small").eval()
+network = RoitrNetwork.named("small")
 clouds = [rng.uniform(0, 70, (12000, 3)) * [1, 1, 0.02] for _ in range(2)]
 batch = make_batch(*clouds, network.config)
-reset_peak_memory()
-before = peak_memory_mb()
-with torch.no_grad():
-    network(batch)
-print((peak_memory_mb() - before) * 2**20, network.memory(batch))
 """
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="peak memory is reset through /proc")
 def test_the_memory_estimate_is_near_and_not_below() -> None:
-    at_once = {"MALLOC_MMAP_THRESHOLD_": "65536", "MALLOC_TRIM_THRESHOLD_": "65536"}
-    command = [sys.executable, "-c", _MEASURE]
-    printed = subprocess.run(
-        command, check=True, capture_output=True, text=True, env={**os.environ, **at_once}
-    ).stdout
-    real, estimate = map(float, printed.split())
+    real, estimate = peak_and_estimate(_MADE)
     assert real <= estimate - SLACK <= 1.5 * real
 
 

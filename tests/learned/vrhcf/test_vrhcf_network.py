@@ -5,14 +5,13 @@ from __future__ import annotations
 
 import dataclasses
 import json
-import os
-import subprocess
 import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 import torch
+from measured import peak_and_estimate
 from streets import moved, street, yaw
 
 from hybridreg.learned.vrhcf.config import ShellConv, SphereNetConfig, SurfaceConv, named_config
@@ -197,31 +196,18 @@ def test_one_batch_of_training_is_enough_to_be_trained() -> None:
     assert network.untrained() == frozenset()
 
 
-_MEASURE = """
-import torch
+_MADE = """
 from hybridreg.learned.vrhcf.batch import SphereBatch
 from hybridreg.learned.vrhcf.network import SphereNet
-from hybridreg.resources import peak_memory_mb, reset_peak_memory
-torch.set_num_threads(1)
-network = SphereNet.named("small").eval()
+network = SphereNet.named("small")
 patches = torch.randn(64, network.config.patch_points, 3)
 batch = SphereBatch(target=patches, source=patches)
-reset_peak_memory()
-before = peak_memory_mb()
-with torch.no_grad():
-    network(batch)
-print((peak_memory_mb() - before) * 2**20, network.memory(batch))
 """
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="peak memory is reset through /proc")
 def test_the_memory_estimate_is_not_below() -> None:
-    at_once = {"MALLOC_MMAP_THRESHOLD_": "65536", "MALLOC_TRIM_THRESHOLD_": "65536"}
-    command = [sys.executable, "-c", _MEASURE]
-    printed = subprocess.run(
-        command, check=True, capture_output=True, text=True, env={**os.environ, **at_once}
-    ).stdout
-    real, estimate = map(float, printed.split())
+    real, estimate = peak_and_estimate(_MADE)
     assert real <= estimate <= 3.0 * real + 2 * SLACK
 
 
