@@ -51,6 +51,7 @@ class RegistrationNetwork(Pretrained):
     name: ClassVar[str] = "cross3dreg"
     config_type: ClassVar[type] = NetworkConfig
     sizes: ClassVar[tuple[str, ...]] = SIZES
+    loss_names: ClassVar[tuple[str, ...]] = ("infonce", "coarse", "fine", "mask")
     named_config = staticmethod(named_config)
 
     def __init__(self, config: NetworkConfig, seed: int = 0) -> None:
@@ -69,6 +70,11 @@ class RegistrationNetwork(Pretrained):
             self.omp = OverlapPredictor(config.omp, config.backbone.coarse_dim, image.dim)
         if image is not None and config.vgam is not None:
             self.vgam = VisualGeometricAttention(config.vgam, hidden, image.dim)
+
+    @classmethod
+    def seeded(cls, config: NetworkConfig, seed: int) -> RegistrationNetwork:
+        """A network of random weights; the seed turns the kernel points."""
+        return cls(config, seed)
 
     def forward(self, batch: Batch) -> Output:
         """Match a pair: encode, predict the overlap, attend, match superpoints, match points."""

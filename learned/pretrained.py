@@ -5,10 +5,14 @@ from __future__ import annotations
 
 import os
 from abc import abstractmethod
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, ClassVar
 
+import numpy as np
 from torch import nn
 
+from hybridreg.learned.loss_parts import Losses
+from hybridreg.learned.true_pair import TruePair
 from hybridreg.learned.untrained import untrained_parts
 from hybridreg.learned.weights import from_pretrained, save_pretrained
 
@@ -19,19 +23,24 @@ if TYPE_CHECKING:
 class Pretrained(nn.Module):
     """A network of `hybridreg.learned.network_table`.
 
-    A subclass is made from a configuration alone, offers ``forward(batch)`` without a truth and ``losses(output,
-    targets)``, and says:
+    A subclass is made from a configuration alone, offers ``forward(batch)`` without a truth, and says:
 
     Attributes
     ----------
     name : its entry in the table
     config_type : the class of its configuration, with ``to_dict`` and ``from_dict``
     sizes : names that `named_config` knows
+    loss_names : what the parts of its losses are called
+    together : do the examples of a training step go through it at once? `collate` makes one of several then
+    validated_with : fields of its stage while it is validated in training
     """
 
     name: ClassVar[str]
     config_type: ClassVar[Any]
     sizes: ClassVar[tuple[str, ...]]
+    loss_names: ClassVar[tuple[str, ...]]
+    together: ClassVar[bool] = False
+    validated_with: ClassVar[Mapping[str, Any]] = {}
     config: Any
 
     @staticmethod
@@ -43,6 +52,11 @@ class Pretrained(nn.Module):
     def named(cls, size: str, **parts: Any) -> Self:
         """A network of random weights of a size by name; ``KeyError`` lists the known ones."""
         return cls(cls.named_config(size, **parts))
+
+    @classmethod
+    def seeded(cls, config: Any, seed: int) -> Self:
+        """A network of random weights; ``seed`` fixes what does not follow torch's generator."""
+        return cls(config)
 
     @classmethod
     @abstractmethod
@@ -82,6 +96,36 @@ class Pretrained(nn.Module):
     def save_pretrained(self, folder: str | os.PathLike[str], *, half: bool = False) -> None:
         """Write ``config.json`` and ``model.safetensors``, each whole or not at all; ``half`` stores float16."""
         save_pretrained(self, folder, half=half)
+
+    @staticmethod
+    def example(pair: TruePair, config: Any, rng: np.random.Generator) -> tuple[Any, Any]:
+        """Batch and targets of a training step, on the CPU; ``rng`` decides all draws.
+
+        Raises
+        ------
+        ValueError
+            A pair that nothing can be learned from.
+        """
+        raise NotImplementedError
+
+    @staticmethod
+    def collate(examples: Sequence[tuple[Any, Any]]) -> tuple[Any, Any]:
+        """One example of several."""
+        raise NotImplementedError
+
+    def training_output(self, batch: Any) -> Any:
+        """As much of a forward pass as `losses` needs."""
+        return self(batch)
+
+    def losses(self, output: Any, targets: Any) -> Losses:
+        """Losses of a training step, ready for ``backward``."""
+        raise NotImplementedError
+
+    @property
+    def voxel(self) -> float | None:
+        """Edge (m) of the grid that it looks at clouds on; None where there is none."""
+        backbone = getattr(self.config, "backbone", self.config)
+        return getattr(backbone, "voxel", None)
 
     def untrained(self) -> frozenset[str]:
         """Names of the parts that no training step has touched."""

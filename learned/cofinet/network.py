@@ -15,6 +15,7 @@ from hybridreg.learned.batch import Batch
 from hybridreg.learned.checkpoints import read_checkpoint
 from hybridreg.learned.cofinet.attention import PairTransformer, scores
 from hybridreg.learned.cofinet.config import SIZES, CofinetConfig, named_config
+from hybridreg.learned.cofinet.examples import example
 from hybridreg.learned.cofinet.losses import CofinetLosses, cofinet_losses
 from hybridreg.learned.cofinet.official_names import UNUSED, official_name
 from hybridreg.learned.cofinet.patching import PatchIndex, patch_index
@@ -82,7 +83,9 @@ class CofinetNetwork(Pretrained):
     name: ClassVar[str] = "cofinet"
     config_type: ClassVar[type] = CofinetConfig
     sizes: ClassVar[tuple[str, ...]] = tuple(SIZES)
+    loss_names: ClassVar[tuple[str, ...]] = ("coarse", "fine")
     named_config = staticmethod(named_config)
+    example = staticmethod(example)
 
     def __init__(self, config: CofinetConfig, seed: int = 0) -> None:
         super().__init__()
@@ -94,6 +97,11 @@ class CofinetNetwork(Pretrained):
         self.decoder = KpfcnnDecoder(config.backbone, config.dim)
         self.fine = PairTransformer(config.fine_dim, config.fine_heads)
 
+    @classmethod
+    def seeded(cls, config: CofinetConfig, seed: int) -> CofinetNetwork:
+        """A network of random weights; the seed turns the kernel points."""
+        return cls(config, seed)
+
     def forward(self, batch: Batch) -> CofinetOutput:
         """Match a pair: encode, match superpoints, match the points of their patches."""
         encoding = self.encode(batch)
@@ -101,6 +109,10 @@ class CofinetNetwork(Pretrained):
         return CofinetOutput(
             encoding=encoding, nodes=nodes, tried=tried, matches=self.match_points(encoding, nodes)
         )
+
+    def training_output(self, batch: Batch) -> CofinetEncoding:
+        """`encode` alone: no match takes part in the losses."""
+        return self.encode(batch)
 
     def encode(self, batch: Batch) -> CofinetEncoding:
         """Features of superpoints and points, and the transport between the superpoints."""

@@ -13,6 +13,7 @@ from torch import Tensor, nn
 from hybridreg.learned.checkpoints import read_checkpoint
 from hybridreg.learned.fcgf.batch import FcgfBatch, VoxelClouds
 from hybridreg.learned.fcgf.config import SIZES, FcgfConfig, named_config
+from hybridreg.learned.fcgf.examples import collate, example
 from hybridreg.learned.fcgf.losses import hardest_contrastive
 from hybridreg.learned.fcgf.memory import forward_bytes
 from hybridreg.learned.fcgf.official_names import config_of, official_name
@@ -20,6 +21,7 @@ from hybridreg.learned.fcgf.targets import FcgfTargets
 from hybridreg.learned.layers.kernel_maps import KernelMap
 from hybridreg.learned.layers.sparse_conv import SparseConv
 from hybridreg.learned.layers.voxels import VoxelPyramid
+from hybridreg.learned.loss_parts import LossParts
 from hybridreg.learned.pretrained import Pretrained
 from hybridreg.learned.weights import load_official_tensors
 
@@ -41,7 +43,11 @@ class FcgfNetwork(Pretrained):
     name: ClassVar[str] = "fcgf"
     config_type: ClassVar[type] = FcgfConfig
     sizes: ClassVar[tuple[str, ...]] = tuple(SIZES)
+    loss_names: ClassVar[tuple[str, ...]] = ("positive", "negative")
     named_config = staticmethod(named_config)
+    example = staticmethod(example)
+    together: ClassVar[bool] = True
+    collate = staticmethod(collate)
 
     def __init__(self, config: FcgfConfig) -> None:
         super().__init__()
@@ -99,10 +105,11 @@ class FcgfNetwork(Pretrained):
     def _same(self, pyramid: VoxelPyramid, level: int) -> KernelMap | None:
         return _map(pyramid, self.config.kernel, level, level)
 
-    def losses(self, output: FcgfOutput, targets: FcgfTargets) -> dict[str, Tensor]:
+    def losses(self, output: FcgfOutput, targets: FcgfTargets) -> LossParts:
         """Hardest-contrastive loss by part, weighed: their sum is what is trained."""
         found = hardest_contrastive(output.source, output.target, targets, self.config.loss)
-        return {"positive": found.positive, "negative": self.config.loss.negative_weight * found.negative}
+        negative = self.config.loss.negative_weight * found.negative
+        return LossParts(positive=found.positive, negative=negative)
 
     def memory(self, batch: FcgfBatch) -> int:
         """Estimated peak of a forward pass in bytes, beside what the process and the batch's points hold already."""

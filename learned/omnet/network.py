@@ -14,8 +14,9 @@ from hybridreg.learned.checkpoints import read_checkpoint
 from hybridreg.learned.memory import SLACK
 from hybridreg.learned.omnet.batch import OmnetBatch
 from hybridreg.learned.omnet.config import SIZES, OmnetConfig, named_config
+from hybridreg.learned.omnet.examples import collate, example
 from hybridreg.learned.omnet.layers import Decoder, Encoder, Fusion, Regression
-from hybridreg.learned.omnet.losses import omnet_losses
+from hybridreg.learned.omnet.losses import OmnetLosses, omnet_losses
 from hybridreg.learned.omnet.official_names import config_of, official_name
 from hybridreg.learned.omnet.quaternions import compose, matrix_of, rotate
 from hybridreg.learned.omnet.targets import OmnetTargets
@@ -61,7 +62,11 @@ class OmnetNetwork(Pretrained):
     name: ClassVar[str] = "omnet"
     config_type: ClassVar[type] = OmnetConfig
     sizes: ClassVar[tuple[str, ...]] = tuple(SIZES)
+    loss_names: ClassVar[tuple[str, ...]] = ("mask", "quaternion", "translation")
     named_config = staticmethod(named_config)
+    example = staticmethod(example)
+    together: ClassVar[bool] = True
+    collate = staticmethod(collate)
 
     def __init__(self, config: OmnetConfig) -> None:
         super().__init__()
@@ -126,7 +131,7 @@ class OmnetNetwork(Pretrained):
             pose=pose,
         )
 
-    def losses(self, output: OmnetOutput, targets: OmnetTargets) -> dict[str, Tensor]:
+    def losses(self, output: OmnetOutput, targets: OmnetTargets) -> OmnetLosses:
         """Weighed losses of every iteration by name (``mask_0``, ``quaternion_0``, ``translation_0``, ...).
 
         Their sum is what is trained.

@@ -55,7 +55,7 @@ class PredatorLossConfig:
     max_points: int = 512  # pairs drawn for the circle loss
     circle_weight: float = 1.0
     overlap_weight: float = 1.0
-    saliency_weight: float = 0.0  # the published training switches it, see `saliency_weight`
+    saliency_weight: float | None = None  # None switches it, see `hybridreg.learned.predator.losses`
 
     def __post_init__(self) -> None:
         limits.within(
@@ -64,7 +64,9 @@ class PredatorLossConfig:
         limits.positive(
             self, "log_scale", "positive_radius", "safe_radius", "overlap_radius", "matchability_radius"
         )
-        limits.within(self, 0.0, 1e6, "positive_slack", "circle_weight", "overlap_weight", "saliency_weight")
+        limits.within(self, 0.0, 1e6, "positive_slack", "circle_weight", "overlap_weight")
+        if self.saliency_weight is not None:
+            limits.within(self, 0.0, 1e6, "saliency_weight")
         limits.at_least(self, 1, "max_points")
 
 

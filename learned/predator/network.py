@@ -15,6 +15,7 @@ from hybridreg.learned.batch import Batch
 from hybridreg.learned.checkpoints import read_checkpoint
 from hybridreg.learned.kpfcnn import KpfcnnDecoder, KpfcnnEncoder
 from hybridreg.learned.predator.config import SIZES, PredatorConfig, named_config
+from hybridreg.learned.predator.examples import example
 from hybridreg.learned.predator.graph import GraphNetwork
 from hybridreg.learned.predator.losses import PredatorLosses, predator_losses
 from hybridreg.learned.predator.official_names import config_name, official_name
@@ -67,7 +68,9 @@ class PredatorNetwork(Pretrained):
     name: ClassVar[str] = "predator"
     config_type: ClassVar[type] = PredatorConfig
     sizes: ClassVar[tuple[str, ...]] = tuple(SIZES)
+    loss_names: ClassVar[tuple[str, ...]] = ("circle", "overlap", "saliency")
     named_config = staticmethod(named_config)
+    example = staticmethod(example)
 
     def __init__(self, config: PredatorConfig, seed: int = 0) -> None:
         super().__init__()
@@ -81,6 +84,11 @@ class PredatorNetwork(Pretrained):
         self.score = nn.Linear(dim, 1)
         self.decoder = KpfcnnDecoder(config.backbone, config.decoder_dim, config.final_dim + 2)
         nn.init.zeros_(self.score.bias)  # by which `untrained` tells
+
+    @classmethod
+    def seeded(cls, config: PredatorConfig, seed: int) -> PredatorNetwork:
+        """A network of random weights; the seed turns the kernel points."""
+        return cls(config, seed)
 
     def forward(self, batch: Batch) -> PredatorOutput:
         """Features and scores of all points of a pair."""

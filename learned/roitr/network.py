@@ -21,6 +21,7 @@ from hybridreg.learned.pretrained import Pretrained
 from hybridreg.learned.roitr.backbone import RoitrBackbone
 from hybridreg.learned.roitr.batch import RoitrBatch
 from hybridreg.learned.roitr.config import SIZES, RoitrConfig, named_config
+from hybridreg.learned.roitr.examples import example
 from hybridreg.learned.roitr.global_transformer import GlobalTransformer
 from hybridreg.learned.roitr.levels import Levels
 from hybridreg.learned.roitr.losses import RoitrLosses, losses
@@ -62,7 +63,9 @@ class RoitrNetwork(Pretrained):
     name: ClassVar[str] = "roitr"
     config_type: ClassVar[type] = RoitrConfig
     sizes: ClassVar[tuple[str, ...]] = tuple(SIZES)
+    loss_names: ClassVar[tuple[str, ...]] = ("coarse", "fine")
     named_config = staticmethod(named_config)
+    example = staticmethod(example)
 
     def __init__(self, config: RoitrConfig) -> None:
         super().__init__()
@@ -119,6 +122,10 @@ class RoitrNetwork(Pretrained):
     def memory(self, batch: RoitrBatch) -> int:
         """Predicted peak of a forward pass in bytes, beside what the process and the batch hold already."""
         return forward_bytes(batch, self.config)
+
+    def training_output(self, batch: RoitrBatch) -> RoitrEncoding:
+        """`encode` alone: no match takes part in the losses."""
+        return self.encode(batch)
 
     def encode(self, batch: RoitrBatch) -> RoitrEncoding:
         """Target and source with unit superpoint features, fine features and patches."""

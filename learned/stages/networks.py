@@ -50,6 +50,11 @@ def load(name: NetworkName) -> Loaded:
     return _load(name, _stamp(name.weights))
 
 
+def forget() -> None:
+    """Let go of all networks that are held."""
+    _load.cache_clear()
+
+
 @lru_cache(maxsize=_HELD)
 def _load(name: NetworkName, stamp: tuple[int, ...]) -> Loaded:
     try:

@@ -3,72 +3,56 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from torch import Tensor
 
-from hybridreg.data import open_dataset
-from hybridreg.data.dataset import ids_of, pair_fingerprints_of
 from hybridreg.learned.config import NetworkConfig
+from hybridreg.learned.training.augmentation import Augmentation
+from hybridreg.learned.training.opened_source import LazyPair, OpenedSource, opened
 from hybridreg.learned.training.prepared import PreparedPair, cloud_key, prepare_clouds, restore, shrink_image
 from hybridreg.learned.training.recipe import Recipe, Source
+from hybridreg.learned.training.samples import Sample, augment
 from hybridreg.learned.training.tensor_cache import TensorCache
-from hybridreg.pair import LabelledPair
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class PairSource:
-    """The pairs of one source of a recipe.
+class PairSource(OpenedSource):
+    """Pairs kept with everything that no rotation changes.
 
     Attributes
     ----------
-    usable : numbers of the pairs that could be prepared
     partner : how far a true partner may lie, voxels (`InfoNceConfig.partner`)
     """
 
-    title: str
-    pairs: Sequence[LabelledPair]
-    ids: tuple[str, ...]
-    fingerprints: tuple[str, ...]
-    usable: tuple[int, ...]
     config: NetworkConfig
     partner: float
-    cache: TensorCache
-
-    def __len__(self) -> int:
-        return len(self.usable)
-
-    def only(self, usable: tuple[int, ...]) -> PairSource:
-        """The source with these pairs alone."""
-        return replace(self, usable=tuple(usable))
 
     def load(self, number: int, scale: float = 1.0) -> PreparedPair:
         """Pair ``usable[number]``; a scale other than 1 is computed anew."""
         index = self.usable[number]
-        lazy = _Lazy(self.pairs, index)
+        lazy = LazyPair(self.pairs, index)
         cache = self.cache if scale == 1.0 else TensorCache(None)
         tensors = cache.get(
             self._cloud_key(index), lambda: prepare_clouds(lazy.pair(), self.config, self.partner, scale)
         )
         return restore(self.ids[index], tensors, self._image(index, lazy), self.config.backbone)
 
-    def prepare(self, index: int) -> str | None:
-        """Put pair ``index`` into the cache; why it cannot be used, or None."""
-        try:
-            lazy = _Lazy(self.pairs, index)
-            self.cache.get(
-                self._cloud_key(index), lambda: prepare_clouds(lazy.pair(), self.config, self.partner)
-            )
-            self._image(index, lazy)
-        except Exception as error:  # one bad pair must not end the run: it is named and left out
-            return " ".join(f"{type(error).__name__}: {error}".split())
-        return None
+    def sample(self, pair: int, number: int, how: Augmentation, rng: np.random.Generator) -> Sample:
+        """As `OpenedSource.sample`."""
+        prepared = self.load(pair, how.draw_scale(rng))
+        return augment(prepared, number, how, self.config.image, rng)
+
+    def fill(self, index: int) -> None:
+        """As `OpenedSource.fill`."""
+        lazy = LazyPair(self.pairs, index)
+        self.cache.get(self._cloud_key(index), lambda: prepare_clouds(lazy.pair(), self.config, self.partner))
+        self._image(index, lazy)
 
     def is_prepared(self, index: int) -> bool:
-        """Does the cache hold pair ``index``?"""
+        """As `OpenedSource.is_prepared`."""
         image = self.config.image is None or self.cache.has(self._image_key(index))
         return image and self.cache.has(self._cloud_key(index))
 
@@ -79,7 +63,7 @@ class PairSource:
         image = self.config.image
         return ("image", self.fingerprints[index], image and (image.height, image.width))
 
-    def _image(self, index: int, lazy: _Lazy) -> Tensor | None:
+    def _image(self, index: int, lazy: LazyPair) -> Tensor | None:
         config = self.config.image
         if config is None:
             return None
@@ -91,19 +75,6 @@ class PairSource:
         return self.cache.get(self._image_key(index), make).get("image")
 
 
-class _Lazy:
-    """A pair read when it is first needed: a cache that holds everything reads nothing."""
-
-    def __init__(self, pairs: Sequence[LabelledPair], index: int) -> None:
-        self._pairs, self._index = pairs, index
-        self._read: LabelledPair | None = None
-
-    def pair(self) -> LabelledPair:
-        if self._read is None:
-            self._read = self._pairs[self._index]
-        return self._read
-
-
 def open_source(source: Source, recipe: Recipe, cache: Path) -> PairSource:
     """Open a source; its pairs are not prepared yet, and all of them count as usable.
 
@@ -112,18 +83,5 @@ def open_source(source: Source, recipe: Recipe, cache: Path) -> PairSource:
     ValueError, FileNotFoundError
         The data cannot be opened, or has no pairs.
     """
-    pairs = open_dataset(source.data)
-    n = min(len(pairs), source.pairs) if source.pairs else len(pairs)
-    if n == 0:
-        raise ValueError(f"{source.title}: a data set of 0 pairs; training needs one at least")
-    keep = source.prepared and not recipe.augmentation.rescales
-    return PairSource(
-        title=source.title,
-        pairs=pairs,
-        ids=ids_of(pairs)[:n],
-        fingerprints=tuple(pair_fingerprints_of(pairs)[:n]),
-        usable=tuple(np.arange(n).tolist()),
-        config=recipe.network,
-        partner=recipe.infonce.partner,
-        cache=TensorCache(cache if keep else None),
-    )
+    fields = opened(source, recipe, cache, rescales=recipe.augmentation.rescales)
+    return PairSource(**fields, config=recipe.network, partner=recipe.infonce.partner)

@@ -4,8 +4,9 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import torch
 from torch import Tensor, nn
@@ -16,6 +17,7 @@ from hybridreg.learned.pretrained import Pretrained
 from hybridreg.learned.vrhcf.batch import SphereBatch
 from hybridreg.learned.vrhcf.config import SIZES, ShellConv, SphereNetConfig, SurfaceConv, named_config
 from hybridreg.learned.vrhcf.cost import CHUNK, forward_bytes
+from hybridreg.learned.vrhcf.examples import example
 from hybridreg.learned.vrhcf.frames import reference_axes, upright_rotations
 from hybridreg.learned.vrhcf.losses import SphereLosses, losses
 from hybridreg.learned.vrhcf.official_names import UNUSED, official_names
@@ -91,7 +93,11 @@ class SphereNet(Pretrained):
     name: ClassVar[str] = "vrhcf"
     config_type: ClassVar[type] = SphereNetConfig
     sizes: ClassVar[tuple[str, ...]] = tuple(SIZES)
+    loss_names: ClassVar[tuple[str, ...]] = ("hardest",)
     named_config = staticmethod(named_config)
+    example = staticmethod(example)
+    # All keypoints of a cloud would take longer than the steps between two validations.
+    validated_with: ClassVar[Mapping[str, Any]] = {"max_keypoints": 500}
 
     def __init__(self, config: SphereNetConfig) -> None:
         super().__init__()

@@ -24,8 +24,6 @@ Rows = NDArray[np.int64]
 
 # Multiply-adds of both clouds together that a stage may take unasked: a minute or so of one CPU core, and of a GPU.
 _CPU_BUDGET, _GPU_BUDGET = 1.5e12, 4e14
-# Metres over the middle of a cloud that nobody knows the place of: axes that face it look upwards.
-_ABOVE = 100.0
 # The published scripts describe at most so many keypoints of a cloud.
 _MOST, _FEWEST = 5_000, 100
 
@@ -77,6 +75,7 @@ class Vrhcf(NetworkStage):
         from hybridreg.learned.memory import require_bytes
         from hybridreg.learned.stages.arrays import array
         from hybridreg.learned.vrhcf.batch import make_batch
+        from hybridreg.learned.vrhcf.frames import place
         from hybridreg.learned.vrhcf.matching import match_descriptors
 
         network: SphereNet = self.network()
@@ -87,8 +86,8 @@ class Vrhcf(NetworkStage):
         rows = [self._rows(points, *level) for points, level in zip(clouds, levels, strict=True)]
         rows = self._capped(scene, rows, config)
         # Axes face the origin: with the sensor there, they face the sensor.
-        seen_from = [_place(level, config.facing) for _, level in levels]
-        moved = [points - place for points, place in zip(clouds, seen_from, strict=True)]
+        seen_from = [place(level, config.facing) for _, level in levels]
+        moved = [points - at for points, at in zip(clouds, seen_from, strict=True)]
         batch = make_batch(moved[0], moved[1], config, keypoints=(rows[0], rows[1]), device=self.device)
         described = (len(rows[0]), len(rows[1]))
         require_bytes(network.memory(batch), described, self.device, "set max_keypoints to less")
@@ -140,12 +139,3 @@ class Vrhcf(NetworkStage):
             warnings.warn(f"VRHCF is about to describe {asked} keypoints: {cost}", UserWarning, stacklevel=3)
         rng = np.random.default_rng(0)
         return [np.sort(rng.choice(r, n, replace=False)) for r, n in zip(rows, counts, strict=True)]
-
-
-def _place(level: Level, facing: str) -> Array:
-    if facing == "origin":
-        return np.zeros(3)
-    if level.viewpoint is None:
-        above: Array = np.median(level.points, axis=0) + [0.0, 0.0, _ABOVE]
-        return above
-    return level.viewpoint if level.viewpoint.ndim == 1 else level.viewpoint.mean(axis=0)
