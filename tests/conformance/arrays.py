@@ -104,13 +104,13 @@ def gradients(
     """Gradient norms of the recorded parameters, and single gradients, against the recording.
 
     ``names`` has our name for each of the original's. A bias before a batch normalisation has no gradient but rounding:
-    norms are held against their own size or a ten-thousandth of the largest, whichever is larger. Of recorded kernels
+    norms are held against their own size or a thousandth of the largest, whichever is larger. Of recorded kernels
     with many offsets, only the first and the middle one may be there.
     """
     ours = dict(network.named_parameters())
     norms = torch.tensor([float(_gradient(ours[names[name]]).double().norm()) for name in recorded])
     norms, expected = norms.double(), want["train.grad_norms"].double()
-    floor = 1e-4 * float(expected.max())
+    floor = 1e-3 * float(expected.max())
     found = {"train.grad_norms": (float(((norms - expected).abs() / expected.clamp_min(floor)).max()), 1e-3)}
     for key in want:
         if key.startswith("train.grad."):
