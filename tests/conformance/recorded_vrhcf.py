@@ -24,6 +24,7 @@ from hybridreg.learned.vrhcf.voxels import counts, spherical, voxels
 from hybridreg.learned.weights import load_official_tensors
 
 TOLERANCE = 1e-4
+_CHAIN = 48  # a multiple of any published batch of frames
 _CLOSE = 1e-6  # distances of descriptors: nearer ones are equals
 
 
@@ -90,10 +91,11 @@ def _descriptors(network: SphereNet, values: dict[str, Tensor], side: str, found
         local = centred @ values[f"out.{side}.rotation"]
     given = network.surface(network.voxelise(local)).amax((2, 3))
     found.close(f"out.{side}.descriptors", given, values[f"out.{side}.descriptors"], TOLERANCE)
-    # From the patches alone a point may be moved by rounding of the axis; descriptors are some 2 apart.
-    found.close(
-        f"out.{side}.descriptors (chain)", network.describe(patches), values[f"out.{side}.descriptors"], 2e-2
-    )
+    # From the patches alone a point may be moved by rounding of the axis; descriptors are some 2 apart. The last ones,
+    # whose frames are made in a batch that need not be full, stand for all.
+    last = patches[-_CHAIN - len(patches) % _CHAIN :]
+    expected = values[f"out.{side}.descriptors"][-len(last) :]
+    found.close(f"out.{side}.descriptors (chain)", network.describe(last), expected, 2e-2)
 
 
 def _steps(network: SphereNet, values: dict[str, Tensor], found: Compared) -> None:
