@@ -12,10 +12,11 @@ from torch import nn
 from hybridreg.learned.backbone import KpconvFpn
 from hybridreg.learned.batch import Batch
 from hybridreg.learned.cofinet.network import CofinetNetwork, CofinetOutput
+from hybridreg.learned.encodings import Output
 from hybridreg.learned.kpconv import KPConv
 from hybridreg.learned.kpfcnn import KpfcnnDecoder
 from hybridreg.learned.message_attention import InterleavedAttention
-from hybridreg.learned.network import Output, RegistrationNetwork
+from hybridreg.learned.network import RegistrationNetwork
 from hybridreg.learned.patch_pairs import size_chunks
 from hybridreg.learned.predator.graph import EdgeConvolution
 from hybridreg.learned.structure_embedding import StructureEmbedding

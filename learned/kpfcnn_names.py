@@ -5,11 +5,9 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Mapping
 
-from torch import Tensor, nn
-
-from hybridreg.learned.weights import load_official_tensors
+from torch import Tensor
 
 _BLOCKS = (
     (r"\bencoder\.blocks\.", "encoder_blocks."),
@@ -39,38 +37,6 @@ def block_name(name: str) -> str:
 def attention_name(name: str) -> str:
     """The checkpoint's name of a tensor of a message layer."""
     return _renamed(name, _ATTENTION)
-
-
-def load_stacked(
-    network: nn.Module,
-    tensors: Mapping[str, Tensor],
-    origin: str,
-    naming: Callable[[str], str],
-    unused: Collection[str] = (),
-) -> None:
-    """Load tensors that bear a checkpoint's names, strictly.
-
-    Parameters
-    ----------
-    naming
-        Gives the checkpoint's name for ours. Where we have a linear layer, its 1x1 convolution is taken too.
-    unused
-        Names that a checkpoint has and no computation reads: they may be there, and are left aside.
-
-    Raises
-    ------
-    ValueError
-        A tensor is missing, superfluous, of another shape or not finite: it is named.
-    """
-    shapes = {naming(name): tensor.shape for name, tensor in network.state_dict().items()}
-
-    def linear(name: str, tensor: Tensor) -> Tensor:
-        shape = shapes.get(name, tensor.shape)
-        convolution = tensor.shape[: len(shape)] == shape and tensor.numel() == shape.numel()
-        return tensor.reshape(shape) if convolution else tensor
-
-    kept = {name: linear(name, tensor) for name, tensor in tensors.items() if name not in unused}
-    load_official_tensors(network, kept, origin, naming)
 
 
 def nearest_config(tensors: Mapping[str, Tensor], key: str, radii: Mapping[str, float], origin: str) -> str:

@@ -3,8 +3,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import Literal, NamedTuple
+import os
+from dataclasses import replace
+from typing import ClassVar, Literal
 
 import torch
 from torch import Tensor, nn
@@ -13,65 +14,30 @@ from torch.nn import functional as F
 from hybridreg.learned.backbone import KpconvFpn
 from hybridreg.learned.batch import Batch
 from hybridreg.learned.blocks import pad_row
+from hybridreg.learned.checkpoints import read_checkpoint
 from hybridreg.learned.config import NetworkConfig, OmpConfig
 from hybridreg.learned.consistency import consistent
+from hybridreg.learned.encodings import CloudEncoding, Encoding, Known, Output
 from hybridreg.learned.geotransformer import GeoTransformerBlock
-from hybridreg.learned.image_encoder import ImageEncoder, ImageFeatures
+from hybridreg.learned.image_encoder import ImageEncoder
+from hybridreg.learned.memory import forward_bytes
 from hybridreg.learned.omp import OverlapLogits, OverlapPredictor
 from hybridreg.learned.patch_pairs import PatchPairs, pair_patches, size_chunks
 from hybridreg.learned.patches import Patches, build_patches
 from hybridreg.learned.point_matching import PointMatches, gather_matches
 from hybridreg.learned.point_similarity import PointSimilarity, Voters, compare_points
+from hybridreg.learned.pretrained import Pretrained
 from hybridreg.learned.pyramid import Pyramid
 from hybridreg.learned.sinkhorn import OptimalTransport
+from hybridreg.learned.sizes import SIZES, named_config
 from hybridreg.learned.superpoint_evidence import superpoint_evidence
 from hybridreg.learned.superpoint_mask import Kept, choose
 from hybridreg.learned.superpoint_matching import SuperpointMatches, match_superpoints
 from hybridreg.learned.vgam import VisualGeometricAttention
+from hybridreg.learned.weights import load_official_tensors
 
 
-@dataclass(frozen=True, kw_only=True)
-class CloudEncoding:
-    """One cloud after the encoders."""
-
-    nodes: Tensor  # (n, 3) superpoints, metres
-    node_features: Tensor  # (n, C)
-    points: Tensor  # (N, 3) fine points, metres
-    point_features: Tensor  # (N, d)
-    patches: Patches
-
-
-@dataclass(frozen=True, kw_only=True)
-class Encoding:
-    """A pair after the encoders: what all later parts share."""
-
-    target: CloudEncoding
-    source: CloudEncoding
-    image: ImageFeatures | None
-    evidence: tuple[Tensor, Tensor] | None = None  # of target and source, where OMP wants it
-
-
-class Known(NamedTuple):
-    """What no turn about the vertical and no shift changes: output of the backbone, and evidence for the overlap."""
-
-    coarse: Tensor  # (n, C), both clouds
-    fine: Tensor  # (N, d)
-    evidence: tuple[Tensor, Tensor] | None = None
-
-
-@dataclass(frozen=True, kw_only=True)
-class Output:
-    """What a forward pass gives."""
-
-    encoding: Encoding
-    overlap: OverlapLogits | None
-    kept: tuple[Kept, Kept]  # target, source
-    node_features: tuple[Tensor, Tensor]  # unit length, of the kept superpoints
-    superpoints: SuperpointMatches  # indices into all superpoints
-    matches: PointMatches
-
-
-class RegistrationNetwork(nn.Module):
+class RegistrationNetwork(Pretrained):
     """Features, overlap, superpoint and point matches of a pair. No part of it takes a ground truth.
 
     Parameters
@@ -81,6 +47,12 @@ class RegistrationNetwork(nn.Module):
     seed
         Fixes how the kernel points of unshared layers are turned. The weights follow torch's generator.
     """
+
+    name: ClassVar[str] = "cross3dreg"
+    config_type: ClassVar[type] = NetworkConfig
+    sizes: ClassVar[tuple[str, ...]] = SIZES
+    loss_names: ClassVar[tuple[str, ...]] = ("infonce", "coarse", "fine", "mask")
+    named_config = staticmethod(named_config)
 
     def __init__(self, config: NetworkConfig, seed: int = 0) -> None:
         super().__init__()
@@ -98,6 +70,11 @@ class RegistrationNetwork(nn.Module):
             self.omp = OverlapPredictor(config.omp, config.backbone.coarse_dim, image.dim)
         if image is not None and config.vgam is not None:
             self.vgam = VisualGeometricAttention(config.vgam, hidden, image.dim)
+
+    @classmethod
+    def seeded(cls, config: NetworkConfig, seed: int) -> RegistrationNetwork:
+        """A network of random weights; the seed turns the kernel points."""
+        return cls(config, seed)
 
     def forward(self, batch: Batch) -> Output:
         """Match a pair: encode, predict the overlap, attend, match superpoints, match points."""
@@ -261,12 +238,16 @@ class RegistrationNetwork(nn.Module):
         iterations: int | None = None,
     ) -> Tensor:
         """Log-assignments (B, n + 1, m + 1) of patch pairs, the last row and column the slack."""
+        scores = self.scores(encoding, pairs)
+        return self.transport(scores, pairs.target_mask, pairs.source_mask, form, iterations)
+
+    def scores(self, encoding: Encoding, pairs: PatchPairs) -> Tensor:
+        """Scaled products (B, n, m) of the features of patch pairs."""
         target = F.embedding(pairs.target_index, pad_row(encoding.target.point_features))
         source = F.embedding(pairs.source_index, pad_row(encoding.source.point_features))
         dim = target.shape[2]
         scale = dim**0.5 if self.config.matching.score_scale == "sqrt" else float(dim)
-        scores = torch.bmm(target, source.transpose(1, 2)) / scale
-        return self.transport(scores, pairs.target_mask, pairs.source_mask, form, iterations)
+        return torch.bmm(target, source.transpose(1, 2)) / scale
 
     def match_points(
         self, encoding: Encoding, superpoints: SuperpointMatches, similarity: PointSimilarity | None = None
@@ -282,6 +263,27 @@ class RegistrationNetwork(nn.Module):
                 unique > config.uniqueness
             )
         return matches
+
+    def memory(self, batch: Batch) -> int:
+        """Predicted peak of a forward pass in bytes, beside what the process and the batch hold already."""
+        return forward_bytes(batch.pyramid, self.config)
+
+    @classmethod
+    def load_official(
+        cls, path: str | os.PathLike[str], size: NetworkConfig | str | None = None
+    ) -> RegistrationNetwork:
+        """GeoTransformer with one of its published checkpoints, as `Pretrained.load_official`.
+
+        Without ``size`` it is ``geotransformer-kitti`` or ``geotransformer-3dmatch``, whichever has the checkpoint's
+        number of stages.
+        """
+        tensors = read_checkpoint(path).tensors
+        if size is None:
+            five = any(name.startswith("backbone.encoder5_") for name in tensors)
+            size = "geotransformer-kitti" if five else "geotransformer-3dmatch"
+        network = cls(named_config(size) if isinstance(size, str) else size)
+        load_official_tensors(network, tensors, str(path))
+        return network.eval()
 
 
 def _voters(cloud: CloudEncoding, kept: Kept) -> Voters:

@@ -1,52 +1,82 @@
 # SPDX-License-Identifier: MIT
-"""Networks by name, and how those of a folder of their own are written and read."""
+"""What every network offers beside its computation: sizes by name, and weights that are written and read."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
-from dataclasses import dataclass, field
-from importlib import import_module
-from pathlib import Path
+from abc import abstractmethod
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from torch import Tensor
+import numpy as np
+from torch import nn
 
-from hybridreg.io.files import read_whole
-from hybridreg.io.torch_file import parse_torch
-from hybridreg.learned.weights import load_tensors, read_folder, save_pretrained
+from hybridreg.learned.loss_parts import Losses
+from hybridreg.learned.true_pair import TruePair
+from hybridreg.learned.untrained import untrained_parts
+from hybridreg.learned.weights import from_pretrained, save_pretrained
 
 if TYPE_CHECKING:
     from typing_extensions import Self
 
-# What a config.json calls its network, and where that is. Without the key it is `RegistrationNetwork`.
-NETWORKS = {
-    "cofinet": "hybridreg.learned.cofinet.network:CofinetNetwork",
-    "fcgf": "hybridreg.learned.fcgf.network:FcgfNetwork",
-    "omnet": "hybridreg.learned.omnet.network:OmnetNetwork",
-    "predator": "hybridreg.learned.predator.network:PredatorNetwork",
-}
 
+class Pretrained(nn.Module):
+    """A network of `hybridreg.learned.network_table`.
 
-def network_class(name: str) -> Any:
-    """The class of a network.
+    A subclass is made from a configuration alone, offers ``forward(batch)`` without a truth, and says:
 
-    Raises
-    ------
-    KeyError
-        An unknown name; the message lists the known ones.
+    Attributes
+    ----------
+    name : its entry in the table
+    config_type : the class of its configuration, with ``to_dict`` and ``from_dict``
+    sizes : names that `named_config` knows
+    loss_names : what the parts of its losses are called
+    together : do the examples of a training step go through it at once? `collate` makes one of several then
+    validated_with : fields of its stage while it is validated in training
     """
-    if name not in NETWORKS:
-        raise KeyError(f"unknown network {name!r}; known are {', '.join(NETWORKS)}")
-    module, _, attribute = NETWORKS[name].partition(":")
-    return getattr(import_module(module), attribute)
-
-
-class Pretrained:
-    """Weights in a folder: ``config.json``, whose key "network" has the network's name, and ``model.safetensors``."""
 
     name: ClassVar[str]
     config_type: ClassVar[Any]
+    sizes: ClassVar[tuple[str, ...]]
+    loss_names: ClassVar[tuple[str, ...]]
+    together: ClassVar[bool] = False
+    validated_with: ClassVar[Mapping[str, Any]] = {}
+    config: Any
+
+    @staticmethod
+    @abstractmethod
+    def named_config(name: str) -> Any:
+        """The configuration of a size; ``KeyError`` lists the known ones."""
+
+    @classmethod
+    def named(cls, size: str, **parts: Any) -> Self:
+        """A network of random weights of a size by name; ``KeyError`` lists the known ones."""
+        return cls(cls.named_config(size, **parts))
+
+    @classmethod
+    def seeded(cls, config: Any, seed: int) -> Self:
+        """A network of random weights; ``seed`` fixes what does not follow torch's generator."""
+        return cls(config)
+
+    @classmethod
+    @abstractmethod
+    def load_official(cls, path: str | os.PathLike[str], size: Any = None) -> Self:
+        """The network of a checkpoint that its authors published, in evaluation mode, read with ``weights_only``.
+
+        Parameters
+        ----------
+        path
+            A file of ``torch.save`` as published, or a bare state dict.
+        size
+            A configuration or its name; None finds it from the tensors.
+
+        Raises
+        ------
+        FileNotFoundError
+            No such file.
+        ValueError
+            Not a checkpoint of this network: the wrong tensor is named.
+        """
 
     @classmethod
     def from_pretrained(cls, name_or_folder: str | os.PathLike[str]) -> Self:
@@ -55,59 +85,52 @@ class Pretrained:
         Raises
         ------
         FileNotFoundError
-            No such folder and no such name.
+            No such folder and no such name; the message lists the names.
         ValueError
             A damaged file, another network's, or a wrong tensor: it is named.
         """
-        config, tensors, origin = read_folder(name_or_folder, cls.name, cls.config_type.from_dict)
-        network: Any = cls(config)  # type: ignore[call-arg]
-        load_tensors(network, tensors, origin)
-        network.eval()
-        return network
+        found = from_pretrained(name_or_folder, cls.name)
+        assert isinstance(found, cls)
+        return found
 
     def save_pretrained(self, folder: str | os.PathLike[str], *, half: bool = False) -> None:
-        """Write both files, each whole or not at all; ``half`` stores float16."""
-        save_pretrained(self, folder, half=half)  # type: ignore[arg-type]
+        """Write ``config.json`` and ``model.safetensors``, each whole or not at all; ``half`` stores float16."""
+        save_pretrained(self, folder, half=half)
 
+    @staticmethod
+    def example(pair: TruePair, config: Any, rng: np.random.Generator) -> tuple[Any, Any]:
+        """Batch and targets of a training step, on the CPU; ``rng`` decides all draws.
 
-@dataclass(frozen=True)
-class Checkpoint:
-    """A published checkpoint: its tensors, and the settings that it was trained with, where the file has them."""
+        Raises
+        ------
+        ValueError
+            A pair that nothing can be learned from.
+        """
+        raise NotImplementedError
 
-    tensors: dict[str, Tensor]
-    settings: Mapping[str, Any] = field(default_factory=dict)
+    @staticmethod
+    def collate(examples: Sequence[tuple[Any, Any]]) -> tuple[Any, Any]:
+        """One example of several."""
+        raise NotImplementedError
 
-    def number(self, name: str) -> float | None:
-        """A positive number among the settings."""
-        value = self.settings.get(name)
-        is_number = isinstance(value, (int, float)) and not isinstance(value, bool) and value > 0
-        return float(value) if is_number else None  # type: ignore[arg-type]
+    def training_output(self, batch: Any) -> Any:
+        """As much of a forward pass as `losses` needs."""
+        return self(batch)
 
+    def losses(self, output: Any, targets: Any) -> Losses:
+        """Losses of a training step, ready for ``backward``."""
+        raise NotImplementedError
 
-def read_checkpoint(path: str | os.PathLike[str]) -> Checkpoint:
-    """Read a checkpoint with ``weights_only``: a bare state dict, or one under ``state_dict`` or ``model``.
+    @property
+    def voxel(self) -> float | None:
+        """Edge (m) of the grid that it looks at clouds on; None where there is none."""
+        backbone = getattr(self.config, "backbone", self.config)
+        return getattr(backbone, "voxel", None)
 
-    The prefix ``module.`` of parallel training is taken off.
+    def untrained(self) -> frozenset[str]:
+        """Names of the parts that no training step has touched."""
+        return untrained_parts(self)
 
-    Raises
-    ------
-    FileNotFoundError
-        No such file.
-    ValueError
-        Damaged, with anything else inside than tensors and plain values, or without a state dict.
-    """
-    file = Path(path)
-    if not file.is_file():
-        raise FileNotFoundError(f"no checkpoint {os.fspath(path)!r}")
-    content = parse_torch(read_whole(file), str(file))
-    content = content if isinstance(content, dict) else {}
-    state = next(
-        (content[key] for key in ("state_dict", "model") if isinstance(content.get(key), dict)), content
-    )
-    if not state or not all(isinstance(value, Tensor) for value in state.values()):
-        raise ValueError(f"{file} holds no state dict, neither at the top nor under 'state_dict' or 'model'")
-    settings = content.get("config")
-    return Checkpoint(
-        {name.removeprefix("module."): tensor for name, tensor in state.items()},
-        settings if isinstance(settings, Mapping) else {},
-    )
+    @abstractmethod
+    def memory(self, batch: Any) -> int:
+        """Predicted peak of a forward pass in bytes, beside what the process and the batch hold already."""

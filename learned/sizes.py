@@ -97,6 +97,7 @@ def _geotransformer_3dmatch() -> NetworkConfig:
 
 _PLANS = {"full": _full, "small": _small, "tiny": _tiny, "nano": _nano}
 _OFFICIAL = {"geotransformer-kitti": _geotransformer_kitti, "geotransformer-3dmatch": _geotransformer_3dmatch}
+SIZES = (*_PLANS, *_OFFICIAL)
 
 
 def named_config(name: str, *, omp: bool = False, vgam: bool = False) -> NetworkConfig:

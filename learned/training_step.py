@@ -8,9 +8,10 @@ from torch import Tensor
 
 from hybridreg.learned.batch import Batch
 from hybridreg.learned.circle_loss import circle_loss
+from hybridreg.learned.encodings import Encoding
 from hybridreg.learned.fine_loss import assignment_loss
 from hybridreg.learned.losses import Losses, mask_loss, overlap_matrix
-from hybridreg.learned.network import Encoding, RegistrationNetwork
+from hybridreg.learned.network import RegistrationNetwork
 from hybridreg.learned.omp import OverlapLogits
 from hybridreg.learned.superpoint_mask import Kept
 from hybridreg.learned.targets import Targets

@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: MIT
-"""Weights on disk: safetensors beside a config.json, and GeoTransformer's published checkpoints."""
+"""Weights on disk: safetensors beside a config.json, and checkpoints by the names that the originals' tensors have."""
 
 from __future__ import annotations
 
 import json
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
 import torch
 from safetensors import SafetensorError
@@ -15,30 +15,27 @@ from safetensors.torch import load_file, save
 from torch import Tensor, nn
 
 from hybridreg.io.atomic import write_bytes, write_text
-from hybridreg.io.files import read_whole
 from hybridreg.io.structured import read_json
-from hybridreg.io.torch_file import parse_torch
-from hybridreg.learned.config import NetworkConfig
-from hybridreg.learned.network import RegistrationNetwork
+from hybridreg.learned.network_table import DEFAULT, NETWORKS, network_class
 from hybridreg.learned.official_names import official_name
-from hybridreg.learned.sizes import named_config
 from hybridreg.shipped_weights import CONFIG_FILE, WEIGHTS_FILE, MissingWeights, find, names
 
 _FLOATS = (torch.float64, torch.float32, torch.float16, torch.bfloat16)
 
-Config = TypeVar("Config")
+if TYPE_CHECKING:
+    from hybridreg.learned.pretrained import Pretrained
 
 
-def save_pretrained(
-    network: RegistrationNetwork, folder: str | os.PathLike[str], *, half: bool = False
-) -> None:
+def save_pretrained(network: Pretrained, folder: str | os.PathLike[str], *, half: bool = False) -> None:
     """Write ``config.json`` and ``model.safetensors`` into a folder, each whole or not at all.
 
     ``half`` stores float16, half the size; a network that reads it computes in float32 all the same.
     """
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
-    text = json.dumps(network.config.to_dict(), indent=1) + "\n"
+    # Versions before the other networks read a config.json that names none.
+    named = {} if network.name == DEFAULT else {"network": network.name}
+    text = json.dumps({**named, **network.config.to_dict()}, indent=1) + "\n"
     tensors = {name: tensor.detach().cpu().contiguous() for name, tensor in network.state_dict().items()}
     if half:
         tensors = {
@@ -49,55 +46,52 @@ def save_pretrained(
     write_text(folder / CONFIG_FILE, text)
 
 
-def from_pretrained(name_or_folder: str | os.PathLike[str]) -> RegistrationNetwork:
-    """A network in evaluation mode from a folder, or by the name of weights that come with the package.
+def from_pretrained(name_or_folder: str | os.PathLike[str], wanted: str | None = None) -> Pretrained:
+    """The network of a folder, or of weights that come with the package, in evaluation mode.
+
+    Parameters
+    ----------
+    wanted
+        Name of the network that it must be; None takes any.
 
     Raises
     ------
     FileNotFoundError
         No such folder and no such name (`MissingWeights`); the message lists the names.
     ValueError
-        A file is damaged, or a tensor is missing, superfluous, of another shape, no float of 16 bits or more, not
-        finite, or a weight of zeros only: it is named.
-    """
-    config, tensors, origin = read_folder(name_or_folder, None, NetworkConfig.from_dict)
-    network = RegistrationNetwork(config)
-    load_tensors(network, tensors, origin)
-    return network.eval()
-
-
-def read_folder(
-    name_or_folder: str | os.PathLike[str], network: str | None, build: Callable[[Mapping[str, Any]], Config]
-) -> tuple[Config, dict[str, Tensor], str]:
-    """Configuration and tensors of a folder, and what the tensors' file is called in messages.
-
-    Parameters
-    ----------
-    network
-        What ``config.json`` must say under "network"; None where it must have no such key.
-    build
-        Makes the configuration from plain values.
-
-    Raises
-    ------
-    FileNotFoundError, ValueError
-        As `from_pretrained`, and for the weights of another network.
+        A file is damaged, of another network than the wanted one, or a tensor is missing, superfluous, of another
+        shape, no float of 16 bits or more, not finite, or a weight of zeros only: it is named.
     """
     folder = _find(name_or_folder)
     try:
-        values = read_json(folder / CONFIG_FILE)
-        found = values.get("network") if isinstance(values, dict) else None
-        config = build(values) if found == network else None
+        name, values = _split(read_json(folder / CONFIG_FILE))
+    except ValueError as error:
+        raise ValueError(f"{folder / CONFIG_FILE} is damaged: {error}") from error
+    if wanted is not None and name != wanted:
+        raise ValueError(f"{folder} holds weights of the network {name!r}, not of {wanted!r}")
+    cls = network_class(name)
+    try:
+        config = cls.config_type.from_dict(values)
     except (ValueError, TypeError, ArithmeticError) as error:
         raise ValueError(f"{folder / CONFIG_FILE} is damaged: {error}") from error
-    if config is None:
-        held, wanted = (f"of {name}" if name else "without the key 'network'" for name in (found, network))
-        raise ValueError(f"{folder} holds weights {held}; wanted are weights {wanted}")
     try:
         tensors = load_file(folder / WEIGHTS_FILE)
     except SafetensorError as error:
         raise ValueError(f"{folder / WEIGHTS_FILE} is damaged: {error}") from error
-    return config, tensors, str(folder / WEIGHTS_FILE)
+    network = cls(config)
+    load_tensors(network, tensors, str(folder / WEIGHTS_FILE))
+    return network.eval()
+
+
+def _split(values: Any) -> tuple[str, dict[str, Any]]:
+    """Name of the network, and its configuration's values."""
+    if not isinstance(values, dict):
+        raise ValueError(f"a table was expected, not {type(values).__name__}")
+    rest = dict(values)
+    name = rest.pop("network", DEFAULT)
+    if not isinstance(name, str) or name not in NETWORKS:
+        raise ValueError(f"unknown network {name!r}; known are {', '.join(NETWORKS)}")
+    return name, rest
 
 
 def find_files(name_or_folder: str | os.PathLike[str]) -> list[Path]:
@@ -153,30 +147,16 @@ def _fault(name: str, tensor: Tensor, expected: Tensor) -> str:
 
 
 def load_official(
-    path: str | os.PathLike[str], config: NetworkConfig | str | None = None
-) -> RegistrationNetwork:
-    """GeoTransformer with one of its published checkpoints, in evaluation mode.
+    path: str | os.PathLike[str], size: Any = None, network: str = DEFAULT, **options: Any
+) -> Pretrained:
+    """A network with one of its published checkpoints, in evaluation mode: `Pretrained.load_official` of its class.
 
     Parameters
     ----------
-    path
-        A ``.pth.tar`` as published, or a bare state dict saved by ``torch.save``. Read with ``weights_only``.
-    config
-        A configuration or its name; by default ``geotransformer-kitti`` or ``geotransformer-3dmatch``,
-        whichever has the checkpoint's number of stages.
-
-    Raises
-    ------
-    ValueError
-        Not a checkpoint of this network: the wrong tensor is named.
+    network
+        Its name; without one GeoTransformer's checkpoints are read.
     """
-    tensors = _read_checkpoint(Path(path))
-    if config is None:
-        five = any(name.startswith("backbone.encoder5_") for name in tensors)
-        config = "geotransformer-kitti" if five else "geotransformer-3dmatch"
-    network = RegistrationNetwork(named_config(config) if isinstance(config, str) else config)
-    load_official_tensors(network, tensors, str(path))
-    return network.eval()
+    return network_class(network).load_official(path, size, **options)
 
 
 def load_official_tensors(
@@ -184,18 +164,34 @@ def load_official_tensors(
     tensors: Mapping[str, Tensor],
     origin: str,
     naming: Callable[[str], str] = official_name,
+    unused: Collection[str] = (),
 ) -> None:
-    """Load tensors that bear the checkpoint's names, strictly; ``naming`` gives these for ours."""
-    # Every non-official name is kept as it is, so that it is reported.
-    ours = {naming(name): name for name in network.state_dict()}
-    load_tensors(network, {ours.get(name, name): tensor for name, tensor in tensors.items()}, origin)
+    """Load tensors that bear a checkpoint's names, strictly.
+
+    Parameters
+    ----------
+    naming
+        Gives the checkpoint's name for ours. Where we have a linear layer, its convolution of size one is taken too.
+    unused
+        Names that every checkpoint holds and no computation reads: they must be there, and are left aside.
+
+    Raises
+    ------
+    ValueError
+        A tensor is missing, superfluous, of another shape or not finite: it is named.
+    """
+    absent = [name for name in unused if name not in tensors]
+    if absent:
+        raise ValueError(f"{origin}: tensor {absent[0]} is missing")
+    state = network.state_dict()
+    ours = {naming(name): name for name in state}
+    left = set(unused)
+    # Every name that is not official is kept as it is, so that it is reported.
+    given = {ours.get(name, name): tensor for name, tensor in tensors.items() if name not in left}
+    load_tensors(network, {name: _as_ours(tensor, state.get(name)) for name, tensor in given.items()}, origin)
 
 
-def _read_checkpoint(path: Path) -> dict[str, Tensor]:
-    if not path.is_file():
-        raise FileNotFoundError(f"no checkpoint {os.fspath(path)!r}")
-    content = parse_torch(read_whole(path), str(path))
-    state = content.get("model", content) if isinstance(content, dict) else None
-    if not isinstance(state, dict) or not all(isinstance(value, Tensor) for value in state.values()):
-        raise ValueError(f"{path} holds no state dict, neither at the top nor under 'model'")
-    return {name.removeprefix("module."): tensor for name, tensor in state.items()}
+def _as_ours(tensor: Tensor, ours: Tensor | None) -> Tensor:
+    if ours is None or tensor.shape[: ours.dim()] != ours.shape or tensor.numel() != ours.numel():
+        return tensor
+    return tensor.reshape(ours.shape)

@@ -213,6 +213,7 @@ def test_list_names_everything() -> None:
         "folder:...",
         "classical",
         "cross3dreg",
+        "fcgf: fcgf-kitti, fcgf-3dmatch, small, nano",
     ):
         assert part in text
     presets = call("list", "presets").stdout

@@ -38,7 +38,7 @@ def command() -> None:
     for module, (distribution, purpose) in _NEEDED.items():
         print(f"  {distribution} {_installed(distribution)}: {_loads(module)} (for {purpose})")
     print(f"GPU: {_gpu()}")
-    for line in _unloadable_stages():
+    for line in (*_unloadable_stages(), *_unloadable_networks()):
         print(line)
 
 
@@ -81,3 +81,13 @@ def _unloadable_stages() -> Iterator[str]:
             registry.load(slot, name)
         except Exception as error:  # a broken plug-in must not hide the rest
             yield f"stage {key} does not load: {sentence(error)}"
+
+
+def _unloadable_networks() -> Iterator[str]:
+    from hybridreg.learned.network_table import NETWORKS, network_class
+
+    for name in NETWORKS:
+        try:
+            network_class(name)
+        except Exception as error:  # as above: whatever a library raises
+            yield f"network {name} does not load: {sentence(error)}"

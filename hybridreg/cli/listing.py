@@ -21,11 +21,12 @@ class Kind(str, Enum):
     tables = "tables"
     protocols = "protocols"
     recipes = "recipes"
+    networks = "networks"
 
 
 @plainly
 def command(kind: Annotated[Kind | None, typer.Argument(help="All kinds if not given.")] = None) -> None:
-    """List stages, presets, data sets, tables, protocols and training recipes."""
+    """List stages, presets, data sets, tables, protocols, training recipes, and networks with their sizes."""
     for each in Kind if kind is None else [kind]:
         print(f"{each.value}:")
         for line in lines(each):
@@ -51,8 +52,20 @@ def lines(kind: Kind) -> Iterator[str]:
         yield from recipe.known()
     elif kind is Kind.recipes:
         yield from recipes.names()
+    elif kind is Kind.networks:
+        yield from (f"{name}: {sizes}" for name, sizes in _networks())
     else:
         yield from (each.describe().removeprefix("protocol ") for each in protocols.PROTOCOLS.values())
+
+
+def _networks() -> Iterator[tuple[str, str]]:
+    from hybridreg.learned.network_table import NETWORKS, network_class
+
+    for name in NETWORKS:
+        try:
+            yield name, ", ".join(network_class(name).sizes)
+        except ImportError as error:  # torch may be what is missing: the other kinds are listed all the same
+            yield name, f"does not load: {error}"
 
 
 def _remark(preset: str) -> str:

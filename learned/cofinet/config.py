@@ -104,14 +104,12 @@ class CofinetConfig:
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values that `from_dict` and JSON take back."""
-        return {"network": "cofinet", **dataclasses.asdict(self)}
+        return dataclasses.asdict(self)
 
     @staticmethod
     def from_dict(values: Mapping[str, Any]) -> CofinetConfig:
         """Build from plain values; an unknown key raises ``ValueError`` that names it."""
-        return build(
-            CofinetConfig, {key: value for key, value in values.items() if key != "network"}, "config"
-        )
+        return build(CofinetConfig, values, "config")
 
 
 def _loss(voxel: float, **changes: Any) -> CofinetLossConfig:
@@ -143,7 +141,7 @@ def _nano() -> CofinetConfig:
     )
 
 
-_SIZES = {"cofinet-kitti": _kitti, "small": _small, "nano": _nano}
+SIZES = {"cofinet-kitti": _kitti, "small": _small, "nano": _nano}
 
 
 def named_config(name: str) -> CofinetConfig:
@@ -154,6 +152,6 @@ def named_config(name: str) -> CofinetConfig:
     KeyError
         An unknown name; the message lists the known ones.
     """
-    if name not in _SIZES:
-        raise KeyError(f"unknown size {name!r} of CoFiNet; known are {', '.join(_SIZES)}")
-    return _SIZES[name]()
+    if name not in SIZES:
+        raise KeyError(f"unknown size {name!r} of CoFiNet; known are {', '.join(SIZES)}")
+    return SIZES[name]()

@@ -28,6 +28,16 @@ class CofinetLosses:
     # Share of the true ones among a pair's matches, mean over the drawn pairs; a pair without matches counts as 0.
     fine_precision: Tensor
 
+    @property
+    def parts(self) -> dict[str, Tensor]:
+        """Before they are weighed, for the log."""
+        return {"coarse": self.coarse, "fine": self.fine}
+
+    @property
+    def hits(self) -> Tensor:
+        """The precision of the points' matches."""
+        return self.fine_precision
+
 
 def cofinet_losses(
     coarse: Tensor, fine: Tensor, targets: CofinetTargets, config: CofinetLossConfig

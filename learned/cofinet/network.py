@@ -12,8 +12,10 @@ from torch import Tensor, nn
 from torch.nn import functional as F
 
 from hybridreg.learned.batch import Batch
+from hybridreg.learned.checkpoints import read_checkpoint
 from hybridreg.learned.cofinet.attention import PairTransformer, scores
-from hybridreg.learned.cofinet.config import CofinetConfig, named_config
+from hybridreg.learned.cofinet.config import SIZES, CofinetConfig, named_config
+from hybridreg.learned.cofinet.examples import example
 from hybridreg.learned.cofinet.losses import CofinetLosses, cofinet_losses
 from hybridreg.learned.cofinet.official_names import UNUSED, official_name
 from hybridreg.learned.cofinet.patching import PatchIndex, patch_index
@@ -21,12 +23,12 @@ from hybridreg.learned.cofinet.selection import NodePairs, Tried, select
 from hybridreg.learned.cofinet.targets import CofinetTargets
 from hybridreg.learned.cofinet.transport import MASKED, alternating_sinkhorn, either_best
 from hybridreg.learned.kpfcnn import KpfcnnDecoder, KpfcnnEncoder
-from hybridreg.learned.kpfcnn_names import load_stacked
 from hybridreg.learned.message_attention import Clouds, Masks
 from hybridreg.learned.point_matching import PointMatches
-from hybridreg.learned.pretrained import Pretrained, read_checkpoint
+from hybridreg.learned.pretrained import Pretrained
 from hybridreg.learned.sinkhorn import kernel_sinkhorn, log_sinkhorn
 from hybridreg.learned.stacked_memory import encoder_bytes
+from hybridreg.learned.weights import load_official_tensors
 
 _FLOAT = 4
 # Pairs of patches worked on at a time: the attention of so many stays small.
@@ -64,7 +66,7 @@ class CofinetOutput:
     matches: PointMatches
 
 
-class CofinetNetwork(Pretrained, nn.Module):
+class CofinetNetwork(Pretrained):
     """Features and matches of a pair. No part of it takes a ground truth.
 
     Exchanging source and target changes the numbers: the source attends first, and each transport normalises its rows
@@ -80,7 +82,10 @@ class CofinetNetwork(Pretrained, nn.Module):
 
     name: ClassVar[str] = "cofinet"
     config_type: ClassVar[type] = CofinetConfig
+    sizes: ClassVar[tuple[str, ...]] = tuple(SIZES)
+    loss_names: ClassVar[tuple[str, ...]] = ("coarse", "fine")
     named_config = staticmethod(named_config)
+    example = staticmethod(example)
 
     def __init__(self, config: CofinetConfig, seed: int = 0) -> None:
         super().__init__()
@@ -92,6 +97,11 @@ class CofinetNetwork(Pretrained, nn.Module):
         self.decoder = KpfcnnDecoder(config.backbone, config.dim)
         self.fine = PairTransformer(config.fine_dim, config.fine_heads)
 
+    @classmethod
+    def seeded(cls, config: CofinetConfig, seed: int) -> CofinetNetwork:
+        """A network of random weights; the seed turns the kernel points."""
+        return cls(config, seed)
+
     def forward(self, batch: Batch) -> CofinetOutput:
         """Match a pair: encode, match superpoints, match the points of their patches."""
         encoding = self.encode(batch)
@@ -99,6 +109,10 @@ class CofinetNetwork(Pretrained, nn.Module):
         return CofinetOutput(
             encoding=encoding, nodes=nodes, tried=tried, matches=self.match_points(encoding, nodes)
         )
+
+    def training_output(self, batch: Batch) -> CofinetEncoding:
+        """`encode` alone: no match takes part in the losses."""
+        return self.encode(batch)
 
     def encode(self, batch: Batch) -> CofinetEncoding:
         """Features of superpoints and points, and the transport between the superpoints."""
@@ -200,7 +214,7 @@ class CofinetNetwork(Pretrained, nn.Module):
 
     @classmethod
     def load_official(
-        cls, path: str | os.PathLike[str], config: CofinetConfig | str | None = None
+        cls, path: str | os.PathLike[str], size: CofinetConfig | str | None = None
     ) -> CofinetNetwork:
         """The network of a published checkpoint, in evaluation mode.
 
@@ -208,7 +222,7 @@ class CofinetNetwork(Pretrained, nn.Module):
         ----------
         path
             A ``.pth`` as published, or a bare state dict saved by ``torch.save``. Read with ``weights_only``.
-        config
+        size
             A configuration or its name, by default ``cofinet-kitti``. Published weights need ``padding="point0"``,
             which that one has.
 
@@ -218,7 +232,7 @@ class CofinetNetwork(Pretrained, nn.Module):
             No such file; not a checkpoint of this network, with the wrong tensor named.
         """
         tensors = read_checkpoint(path).tensors
-        config = config or "cofinet-kitti"
-        network = cls(named_config(config) if isinstance(config, str) else config)
-        load_stacked(network, tensors, str(path), official_name, UNUSED)
+        size = size or "cofinet-kitti"
+        network = cls(named_config(size) if isinstance(size, str) else size)
+        load_official_tensors(network, tensors, str(path), official_name, UNUSED)
         return network.eval()

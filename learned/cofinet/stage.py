@@ -58,10 +58,9 @@ class Cofinet(StackedStage):
 
         from hybridreg.learned.stages.arrays import array
         from hybridreg.learned.stages.drawing import draw
-        from hybridreg.learned.stages.encoding import note_random
 
-        note_random(scene, self)
-        network = self.network()
+        self.note_random(scene)
+        network: CofinetNetwork = self.network()
         encoding = scene.shared(("encoding", self.network_name()), lambda: self._encode(scene))
         with torch.inference_mode():
             found = network.match_points(encoding, self._nodes(scene, overlap, encoding))
@@ -73,10 +72,6 @@ class Cofinet(StackedStage):
             group=found.group.cpu().numpy()[rows],
             spacing=network.config.backbone.voxel,
         )
-
-    def network(self) -> CofinetNetwork:  # type: ignore[override]
-        """The network in evaluation mode, read when it is first asked for; errors as `from_pretrained`."""
-        return super().network()  # type: ignore[return-value]
 
     def _encode(self, scene: Scene) -> CofinetEncoding:
         import torch

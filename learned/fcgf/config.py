@@ -83,15 +83,15 @@ class FcgfConfig:
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values that `from_dict` and JSON take back."""
-        return {"network": "fcgf", **dataclasses.asdict(self)}
+        return dataclasses.asdict(self)
 
     @staticmethod
     def from_dict(values: Mapping[str, Any]) -> FcgfConfig:
         """Build from plain values; an unknown key raises ``ValueError`` that names it."""
-        return build(FcgfConfig, {key: value for key, value in values.items() if key != "network"}, "config")
+        return build(FcgfConfig, values, "config")
 
 
-_SIZES = {
+SIZES = {
     "fcgf-kitti": FcgfConfig(),
     "fcgf-3dmatch": FcgfConfig(first_kernel=7, voxel=0.025),
     "small": FcgfConfig(channels=(16, 32, 64, 128), tr_channels=(32, 32, 32, 64), normalize_eps=1e-8),
@@ -114,6 +114,6 @@ def named_config(name: str) -> FcgfConfig:
     KeyError
         An unknown name; the message lists the known ones.
     """
-    if name not in _SIZES:
-        raise KeyError(f"unknown size {name!r} of FCGF; known are {', '.join(_SIZES)}")
-    return _SIZES[name]
+    if name not in SIZES:
+        raise KeyError(f"unknown size {name!r} of FCGF; known are {', '.join(SIZES)}")
+    return SIZES[name]

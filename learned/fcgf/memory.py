@@ -9,11 +9,11 @@ from typing import NamedTuple
 from hybridreg.learned.fcgf.config import FcgfConfig
 from hybridreg.learned.layers.sparse_conv import FEW_CHANNELS
 from hybridreg.learned.layers.voxels import VoxelPyramid
+from hybridreg.learned.memory import SLACK
 
 _FLOAT, _INDEX = 4, 8
 _PER_PAIR = 2 * _INDEX  # a list of pairs keeps its inputs and its outputs
 _COPIES = 3  # of a layer's output alive at a time: normalised, rectified, and what a block adds to it
-_SLACK = 2**26  # what the heap holds beside what is in use
 
 
 class _Layer(NamedTuple):
@@ -33,7 +33,7 @@ class _Layer(NamedTuple):
 def forward_bytes(pyramids: Sequence[VoxelPyramid], config: FcgfConfig) -> int:
     """Peak of a forward pass over the pyramids one after another, whose maps all stay. Makes the maps' tables."""
     kept = sum(_maps(pyramid, config) for pyramid in pyramids)
-    return _SLACK + kept + max(_working(pyramid, config) for pyramid in pyramids)
+    return SLACK + kept + max(_working(pyramid, config) for pyramid in pyramids)
 
 
 def _layers(config: FcgfConfig) -> Iterator[_Layer]:

@@ -10,8 +10,10 @@ from typing import ClassVar
 import torch
 from torch import Tensor, nn
 
+from hybridreg.learned.checkpoints import read_checkpoint
 from hybridreg.learned.fcgf.batch import FcgfBatch, VoxelClouds
-from hybridreg.learned.fcgf.config import FcgfConfig, named_config
+from hybridreg.learned.fcgf.config import SIZES, FcgfConfig, named_config
+from hybridreg.learned.fcgf.examples import collate, example
 from hybridreg.learned.fcgf.losses import hardest_contrastive
 from hybridreg.learned.fcgf.memory import forward_bytes
 from hybridreg.learned.fcgf.official_names import config_of, official_name
@@ -19,7 +21,8 @@ from hybridreg.learned.fcgf.targets import FcgfTargets
 from hybridreg.learned.layers.kernel_maps import KernelMap
 from hybridreg.learned.layers.sparse_conv import SparseConv
 from hybridreg.learned.layers.voxels import VoxelPyramid
-from hybridreg.learned.pretrained import Pretrained, read_checkpoint
+from hybridreg.learned.loss_parts import LossParts
+from hybridreg.learned.pretrained import Pretrained
 from hybridreg.learned.weights import load_official_tensors
 
 
@@ -31,7 +34,7 @@ class FcgfOutput:
     target: Tensor  # (M, C)
 
 
-class FcgfNetwork(Pretrained, nn.Module):
+class FcgfNetwork(Pretrained):
     """Features of a pair, each cloud alone. No part of it takes a ground truth.
 
     In training mode the statistics of batch normalisation are one side's, source first, as in the published training.
@@ -39,7 +42,12 @@ class FcgfNetwork(Pretrained, nn.Module):
 
     name: ClassVar[str] = "fcgf"
     config_type: ClassVar[type] = FcgfConfig
+    sizes: ClassVar[tuple[str, ...]] = tuple(SIZES)
+    loss_names: ClassVar[tuple[str, ...]] = ("positive", "negative")
     named_config = staticmethod(named_config)
+    example = staticmethod(example)
+    together: ClassVar[bool] = True
+    collate = staticmethod(collate)
 
     def __init__(self, config: FcgfConfig) -> None:
         super().__init__()
@@ -97,10 +105,11 @@ class FcgfNetwork(Pretrained, nn.Module):
     def _same(self, pyramid: VoxelPyramid, level: int) -> KernelMap | None:
         return _map(pyramid, self.config.kernel, level, level)
 
-    def losses(self, output: FcgfOutput, targets: FcgfTargets) -> dict[str, Tensor]:
+    def losses(self, output: FcgfOutput, targets: FcgfTargets) -> LossParts:
         """Hardest-contrastive loss by part, weighed: their sum is what is trained."""
         found = hardest_contrastive(output.source, output.target, targets, self.config.loss)
-        return {"positive": found.positive, "negative": self.config.loss.negative_weight * found.negative}
+        negative = self.config.loss.negative_weight * found.negative
+        return LossParts(positive=found.positive, negative=negative)
 
     def memory(self, batch: FcgfBatch) -> int:
         """Estimated peak of a forward pass in bytes, beside what the process and the batch's points hold already."""
@@ -108,19 +117,25 @@ class FcgfNetwork(Pretrained, nn.Module):
 
     @classmethod
     def load_official(
-        cls, path: str | os.PathLike[str], *, normalize: bool, voxel: float | None = None
+        cls,
+        path: str | os.PathLike[str],
+        size: FcgfConfig | str | None = None,
+        *,
+        normalize: bool | None = None,
+        voxel: float | None = None,
     ) -> FcgfNetwork:
         """A published checkpoint, or a bare state dict, in evaluation mode. Read with ``weights_only``.
-
-        Widths and kernels are read from the tensors' shapes, the first kernel from ``conv1.kernel``.
 
         Parameters
         ----------
         path
             A ``.pth`` as published (``state_dict`` and ``config``).
+        size
+            A configuration or its name, which settles everything. By default widths and kernels are read from the
+            tensors' shapes, the first kernel from ``conv1.kernel``.
         normalize
-            Was it trained with features of length one? Nothing in the tensors tells: the table of the repository's
-            README has a column for it.
+            Was it trained with features of length one? Nothing in the tensors tells, so it must be said where ``size``
+            does not: the table of the repository's README has a column for it.
         voxel
             Edge (m) of the grid it was trained with. None takes what the file says; where it says nothing, 0.025 for a
             first kernel of 7 (3DMatch at 2.5 cm) and 0.3 (KITTI) for others. Name it for 3DMatch weights of 5 cm.
@@ -130,12 +145,21 @@ class FcgfNetwork(Pretrained, nn.Module):
         FileNotFoundError
             No such file.
         ValueError
-            Not a checkpoint of this network: the wrong tensor is named.
+            Not a checkpoint of this network: the wrong tensor is named. Or ``normalize`` was not said, or said twice.
         """
         checkpoint = read_checkpoint(path)
-        config = config_of(
-            checkpoint.tensors, str(path), normalize=normalize, voxel=voxel or checkpoint.number("voxel_size")
-        )
+        if size is not None:
+            if normalize is not None or voxel is not None:
+                raise ValueError("size=... settles normalize and voxel too: give it alone, or leave it out")
+            config = named_config(size) if isinstance(size, str) else size
+        elif normalize is None:
+            raise ValueError(
+                f"the checkpoint {os.fspath(path)!r} does not tell whether its features were normalised in training; "
+                "say normalize=True or normalize=False (the table of FCGF's README has it)"
+            )
+        else:
+            voxel = voxel or checkpoint.number("voxel_size")
+            config = config_of(checkpoint.tensors, str(path), normalize=normalize, voxel=voxel)
         network = cls(config)
         load_official_tensors(network, checkpoint.tensors, str(path), official_name)
         return network.eval()

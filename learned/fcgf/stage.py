@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import os
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -13,10 +12,9 @@ from hybridreg.matches import Correspondences, Overlap
 from hybridreg.scene import Scene
 
 if TYPE_CHECKING:
-    from typing_extensions import Self
-
     from hybridreg.learned.fcgf.network import FcgfNetwork
-    from hybridreg.learned.stages.networks import NetworkName
+
+    pass
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,7 +41,7 @@ class Fcgf(NetworkStage):
     normalize: bool | None = None
     voxel: float | None = None
 
-    image: ClassVar[bool] = False
+    kind: ClassVar[str] = "fcgf"
     gives: ClassVar[frozenset[str]] = frozenset({"matches"})
     parts: ClassVar[frozenset[str]] = frozenset({"encoder", "decoder"})
 
@@ -52,24 +50,17 @@ class Fcgf(NetworkStage):
         if not 0.0 <= self.min_overlap <= 1.0:
             raise ValueError(f"min_overlap={self.min_overlap} must lie in [0, 1]")
 
-    @classmethod
-    def load_official(
-        cls, path: str | os.PathLike[str], *, normalize: bool, voxel: float | None = None, **fields: Any
-    ) -> Self:
-        """Stage of a published checkpoint, read at once: arguments and errors as `FcgfNetwork.load_official`."""
-        return cls.from_pretrained(path, normalize=normalize, voxel=voxel, **fields)
-
     def __call__(self, scene: Scene, overlap: Overlap) -> Correspondences:
         import torch
 
         from hybridreg.learned.fcgf.batch import make_batch
         from hybridreg.learned.memory import require_bytes
         from hybridreg.learned.stages.arrays import array
-        from hybridreg.learned.stages.encoding import note_grid, note_random
+        from hybridreg.learned.stages.network_grid import note_grid
 
-        network = self.network()
+        network: FcgfNetwork = self.network()
         voxel = network.config.voxel
-        note_random(scene, self)
+        self.note_random(scene)
         note_grid(scene, voxel)
         clouds = (scene.pair.target.points, scene.pair.source.points)
         batch = make_batch(*clouds, network.config, device=self.device)
@@ -84,24 +75,6 @@ class Fcgf(NetworkStage):
             scene, overlap, source, target, min_overlap=self.min_overlap, mutual=self.mutual, spacing=voxel
         )
 
-    def network(self) -> FcgfNetwork:  # type: ignore[override]
-        """The network in evaluation mode, read when it is first asked for.
-
-        Raises
-        ------
-        ValueError
-            As `from_pretrained`.
-        """
-        return super().network()  # type: ignore[return-value]
-
-    def network_name(self) -> NetworkName:
-        """What tells this stage's network from others."""
-        from hybridreg.learned.stages.networks import NetworkName, is_checkpoint
-
-        if self.normalize is None and self.weights is not None and is_checkpoint(self.weights):
-            raise ValueError(
-                f"Fcgf: the checkpoint {self.weights!r} does not tell whether its features were normalised in "
-                "training; say normalize=True or normalize=False (the table of FCGF's README has it)"
-            )
-        options = (("normalize", self.normalize), ("voxel", self.voxel))
-        return NetworkName(self.weights, self.size, self.device, False, "fcgf", options)
+    def told(self) -> tuple[tuple[str, Any], ...]:
+        """What a published checkpoint cannot tell, as `FcgfNetwork.load_official` takes it."""
+        return (("normalize", self.normalize), ("voxel", self.voxel))

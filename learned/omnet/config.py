@@ -93,15 +93,15 @@ class OmnetConfig:
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values that `from_dict` and JSON take back."""
-        return {"network": "omnet", **dataclasses.asdict(self)}
+        return dataclasses.asdict(self)
 
     @staticmethod
     def from_dict(values: Mapping[str, Any]) -> OmnetConfig:
         """Build from plain values; an unknown key raises ``ValueError`` that names it."""
-        return build(OmnetConfig, {key: value for key, value in values.items() if key != "network"}, "config")
+        return build(OmnetConfig, values, "config")
 
 
-_SIZES = {
+SIZES = {
     "omnet-modelnet": OmnetConfig(),
     "small": OmnetConfig(
         encoder=(32, 32, 32, 64, 256),
@@ -129,6 +129,6 @@ def named_config(name: str) -> OmnetConfig:
     KeyError
         An unknown name; the message lists the known ones.
     """
-    if name not in _SIZES:
-        raise KeyError(f"unknown size {name!r} of OMNet; known are {', '.join(_SIZES)}")
-    return _SIZES[name]
+    if name not in SIZES:
+        raise KeyError(f"unknown size {name!r} of OMNet; known are {', '.join(SIZES)}")
+    return SIZES[name]

@@ -9,6 +9,7 @@ import torch
 from torch import Tensor
 from torch.nn import functional as F
 
+from hybridreg.learned.loss_parts import LossParts
 from hybridreg.learned.omnet.config import OmnetLossConfig
 from hybridreg.learned.omnet.targets import OmnetTargets, overlap_labels
 
@@ -16,9 +17,21 @@ if TYPE_CHECKING:
     from hybridreg.learned.omnet.network import OmnetOutput, Step
 
 
-def omnet_losses(output: OmnetOutput, targets: OmnetTargets, config: OmnetLossConfig) -> dict[str, Tensor]:
+class OmnetLosses(LossParts):
+    """By name and iteration; the log has each name's sum over the iterations."""
+
+    @property
+    def parts(self) -> dict[str, Tensor]:
+        """Sums over the iterations."""
+        return {
+            name: torch.stack([loss for key, loss in self.items() if key.startswith(f"{name}_")]).sum()
+            for name in ("mask", "quaternion", "translation")
+        }
+
+
+def omnet_losses(output: OmnetOutput, targets: OmnetTargets, config: OmnetLossConfig) -> OmnetLosses:
     """Weighed losses by name: ``mask_i``, ``quaternion_i`` and ``translation_i`` of every iteration i."""
-    found = {}
+    found = OmnetLosses()
     for i, step in enumerate(output.steps):
         labels = step_labels(output, step, targets, config)
         logits = (step.source_logits, step.target_logits)

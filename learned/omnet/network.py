@@ -10,14 +10,17 @@ from typing import ClassVar
 import torch
 from torch import Tensor, nn
 
+from hybridreg.learned.checkpoints import read_checkpoint
+from hybridreg.learned.memory import SLACK
 from hybridreg.learned.omnet.batch import OmnetBatch
-from hybridreg.learned.omnet.config import OmnetConfig, named_config
+from hybridreg.learned.omnet.config import SIZES, OmnetConfig, named_config
+from hybridreg.learned.omnet.examples import collate, example
 from hybridreg.learned.omnet.layers import Decoder, Encoder, Fusion, Regression
-from hybridreg.learned.omnet.losses import omnet_losses
+from hybridreg.learned.omnet.losses import OmnetLosses, omnet_losses
 from hybridreg.learned.omnet.official_names import config_of, official_name
 from hybridreg.learned.omnet.quaternions import compose, matrix_of, rotate
 from hybridreg.learned.omnet.targets import OmnetTargets
-from hybridreg.learned.pretrained import Pretrained, read_checkpoint
+from hybridreg.learned.pretrained import Pretrained
 from hybridreg.learned.weights import load_official_tensors
 
 
@@ -49,7 +52,7 @@ class OmnetOutput:
         return matrix_of(self.steps[-1].pose)
 
 
-class OmnetNetwork(Pretrained, nn.Module):
+class OmnetNetwork(Pretrained):
     """Poses of a batch of pairs. No part of it takes a ground truth.
 
     A pose never sees the mask of its own iteration: the first ``mask_delay`` iterations see every point, each later one
@@ -58,7 +61,12 @@ class OmnetNetwork(Pretrained, nn.Module):
 
     name: ClassVar[str] = "omnet"
     config_type: ClassVar[type] = OmnetConfig
+    sizes: ClassVar[tuple[str, ...]] = tuple(SIZES)
+    loss_names: ClassVar[tuple[str, ...]] = ("mask", "quaternion", "translation")
     named_config = staticmethod(named_config)
+    example = staticmethod(example)
+    together: ClassVar[bool] = True
+    collate = staticmethod(collate)
 
     def __init__(self, config: OmnetConfig) -> None:
         super().__init__()
@@ -123,7 +131,7 @@ class OmnetNetwork(Pretrained, nn.Module):
             pose=pose,
         )
 
-    def losses(self, output: OmnetOutput, targets: OmnetTargets) -> dict[str, Tensor]:
+    def losses(self, output: OmnetOutput, targets: OmnetTargets) -> OmnetLosses:
         """Weighed losses of every iteration by name (``mask_0``, ``quaternion_0``, ``translation_0``, ...).
 
         Their sum is what is trained.
@@ -139,14 +147,21 @@ class OmnetNetwork(Pretrained, nn.Module):
             3 * max(*config.fusion, *config.encoder),
         )
         kept = config.regression_input // 2 + config.local_dim + config.encoder[-1]
-        return 2**26 + len(batch.source) * points * (inner + kept) * 4
+        return SLACK + len(batch.source) * points * (inner + kept) * 4
 
     @classmethod
-    def load_official(cls, path: str | os.PathLike[str]) -> OmnetNetwork:
+    def load_official(
+        cls, path: str | os.PathLike[str], size: OmnetConfig | str | None = None
+    ) -> OmnetNetwork:
         """A published checkpoint (PyTorch form), or a bare state dict, in evaluation mode. Read with ``weights_only``.
 
-        Layers, widths and iterations are read from the tensors' shapes; the mask delay (2), which layer is a point's
-        own (the second) and the losses are those of all published weights.
+        Parameters
+        ----------
+        path
+            A ``.pth`` as published.
+        size
+            A configuration or its name. By default layers, widths and iterations are read from the tensors' shapes; the
+            mask delay (2), which layer is a point's own (the second) and the losses are those of all published weights.
 
         Raises
         ------
@@ -156,7 +171,8 @@ class OmnetNetwork(Pretrained, nn.Module):
             Not a checkpoint of this network: the wrong tensor is named.
         """
         tensors = read_checkpoint(path).tensors
-        network = cls(config_of(tensors, str(path)))
+        config = named_config(size) if isinstance(size, str) else size
+        network = cls(config or config_of(tensors, str(path)))
         layers = len(network.config.decoder)
         load_official_tensors(network, tensors, str(path), lambda name: official_name(name, layers))
         return network.eval()

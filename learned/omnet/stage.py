@@ -3,9 +3,8 @@
 
 from __future__ import annotations
 
-import os
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
@@ -15,10 +14,9 @@ from hybridreg.matches import Correspondences, Pose
 from hybridreg.scene import Scene, centre
 
 if TYPE_CHECKING:
-    from typing_extensions import Self
-
     from hybridreg.learned.omnet.network import OmnetNetwork
-    from hybridreg.learned.stages.networks import NetworkName
+
+    pass
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -37,7 +35,7 @@ class OmNet(NetworkStage):
 
     points: int | None = None
 
-    image: ClassVar[bool] = False
+    kind: ClassVar[str] = "omnet"
     parts: ClassVar[frozenset[str]] = frozenset({"encoder", "fusion", "decoder", "regression"})
 
     def __post_init__(self) -> None:
@@ -45,21 +43,15 @@ class OmNet(NetworkStage):
         if self.points is not None and not self.points >= 1:
             raise ValueError(f"points={self.points} must be at least 1")
 
-    @classmethod
-    def load_official(cls, path: str | os.PathLike[str], **fields: Any) -> Self:
-        """Stage of a published checkpoint, read at once: errors as `OmnetNetwork.load_official`."""
-        return cls.from_pretrained(path, **fields)
-
     def __call__(self, scene: Scene, matches: Correspondences, rng: np.random.Generator) -> Pose:
         import torch
 
         from hybridreg.learned.memory import require_bytes
         from hybridreg.learned.omnet.batch import make_batch
         from hybridreg.learned.stages.arrays import array
-        from hybridreg.learned.stages.encoding import note_random
 
-        network = self.network()
-        note_random(scene, self)
+        network: OmnetNetwork = self.network()
+        self.note_random(scene)
         levels = (scene.target, scene.source)
         points = self.points or network.config.points
         if any(len(level) > points for level in levels):
@@ -81,19 +73,3 @@ class OmNet(NetworkStage):
             scene.note("OMNet gave no finite pose")
             return Pose.unknown(len(matches))
         return Pose(units.metres(se3.from_rt(se3.project(found[:, :3]), found[:, 3])))
-
-    def network(self) -> OmnetNetwork:  # type: ignore[override]
-        """The network in evaluation mode, read when it is first asked for.
-
-        Raises
-        ------
-        ValueError
-            As `from_pretrained`.
-        """
-        return super().network()  # type: ignore[return-value]
-
-    def network_name(self) -> NetworkName:
-        """What tells this stage's network from others."""
-        from hybridreg.learned.stages.networks import NetworkName
-
-        return NetworkName(self.weights, self.size, self.device, False, "omnet")

@@ -55,7 +55,7 @@ class PredatorLossConfig:
     max_points: int = 512  # pairs drawn for the circle loss
     circle_weight: float = 1.0
     overlap_weight: float = 1.0
-    saliency_weight: float = 0.0  # the published training switches it, see `saliency_weight`
+    saliency_weight: float | None = None  # None switches it, see `hybridreg.learned.predator.losses`
 
     def __post_init__(self) -> None:
         limits.within(
@@ -64,7 +64,9 @@ class PredatorLossConfig:
         limits.positive(
             self, "log_scale", "positive_radius", "safe_radius", "overlap_radius", "matchability_radius"
         )
-        limits.within(self, 0.0, 1e6, "positive_slack", "circle_weight", "overlap_weight", "saliency_weight")
+        limits.within(self, 0.0, 1e6, "positive_slack", "circle_weight", "overlap_weight")
+        if self.saliency_weight is not None:
+            limits.within(self, 0.0, 1e6, "saliency_weight")
         limits.at_least(self, 1, "max_points")
 
 
@@ -99,14 +101,12 @@ class PredatorConfig:
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values that `from_dict` and JSON take back."""
-        return {"network": "predator", **dataclasses.asdict(self)}
+        return dataclasses.asdict(self)
 
     @staticmethod
     def from_dict(values: Mapping[str, Any]) -> PredatorConfig:
         """Build from plain values; an unknown key raises ``ValueError`` that names it."""
-        return build(
-            PredatorConfig, {key: value for key, value in values.items() if key != "network"}, "config"
-        )
+        return build(PredatorConfig, values, "config")
 
 
 def _indoor() -> PredatorConfig:
@@ -143,7 +143,7 @@ def _nano() -> PredatorConfig:
     return PredatorConfig(backbone=backbone, graph=GraphConfig(dim=32), final_dim=16, loss=_scaled(0.5))
 
 
-_SIZES = {"predator-kitti": PredatorConfig, "predator-3dmatch": _indoor, "small": _small, "nano": _nano}
+SIZES = {"predator-kitti": PredatorConfig, "predator-3dmatch": _indoor, "small": _small, "nano": _nano}
 
 
 def named_config(name: str) -> PredatorConfig:
@@ -154,6 +154,6 @@ def named_config(name: str) -> PredatorConfig:
     KeyError
         An unknown name; the message lists the known ones.
     """
-    if name not in _SIZES:
-        raise KeyError(f"unknown size {name!r} of Predator; known are {', '.join(_SIZES)}")
-    return _SIZES[name]()
+    if name not in SIZES:
+        raise KeyError(f"unknown size {name!r} of Predator; known are {', '.join(SIZES)}")
+    return SIZES[name]()

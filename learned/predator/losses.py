@@ -63,8 +63,19 @@ class PredatorLosses:
 
     @property
     def total(self) -> Tensor:
-        """With the configuration's weights."""
-        return self.weighed(self.config.saliency_weight)
+        """With the configuration's weights; where it has none for the saliency, the recall of this step switches it."""
+        given = self.config.saliency_weight
+        return self.weighed(saliency_weight(float(self.recall)) if given is None else given)
+
+    @property
+    def parts(self) -> dict[str, Tensor]:
+        """Before they are weighed, for the log."""
+        return {"circle": self.circle, "overlap": self.overlap.loss, "saliency": self.saliency.loss}
+
+    @property
+    def hits(self) -> Tensor:
+        """The recall."""
+        return self.recall
 
     def weighed(self, saliency_weight: float) -> Tensor:
         """The sum with a weight of the saliency loss, as `saliency_weight` finds it."""
@@ -74,9 +85,11 @@ class PredatorLosses:
 
 
 def saliency_weight(recall: float) -> float:
-    """Weight of the saliency loss for the next epoch, by the validation's recall in this one (lib/trainer.py).
+    """Weight of the saliency loss, by a recall (lib/trainer.py).
 
-    It is switched, not faded in: 0 up to a recall of 0.3, 1 above, and 0 again if the recall falls.
+    It is switched, not faded in: 0 up to a recall of 0.3, 1 above, and 0 again if the recall falls. Published is the
+    validation's recall of the epoch before; `PredatorLosses.total` goes by the step's own, so that a resumed run needs
+    to remember nothing.
     """
     return 1.0 if recall > _RECALL else 0.0
 

@@ -12,16 +12,18 @@ from torch import Tensor, nn
 from torch.nn import functional as F
 
 from hybridreg.learned.batch import Batch
+from hybridreg.learned.checkpoints import read_checkpoint
 from hybridreg.learned.kpfcnn import KpfcnnDecoder, KpfcnnEncoder
-from hybridreg.learned.kpfcnn_names import load_stacked
-from hybridreg.learned.predator.config import PredatorConfig, named_config
+from hybridreg.learned.predator.config import SIZES, PredatorConfig, named_config
+from hybridreg.learned.predator.examples import example
 from hybridreg.learned.predator.graph import GraphNetwork
 from hybridreg.learned.predator.losses import PredatorLosses, predator_losses
 from hybridreg.learned.predator.official_names import config_name, official_name
 from hybridreg.learned.predator.targets import PredatorTargets
-from hybridreg.learned.pretrained import Pretrained, read_checkpoint
+from hybridreg.learned.pretrained import Pretrained
 from hybridreg.learned.pyramid import Pyramid
 from hybridreg.learned.stacked_memory import encoder_bytes
+from hybridreg.learned.weights import load_official_tensors
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -49,7 +51,7 @@ class PredatorOutput:
     source: PredatorCloud
 
 
-class PredatorNetwork(Pretrained, nn.Module):
+class PredatorNetwork(Pretrained):
     """Features, overlap and saliency of both clouds' points. No part of it takes a ground truth.
 
     Exchanging source and target changes the numbers: the source attends first. Evaluation and training mode compute
@@ -65,7 +67,10 @@ class PredatorNetwork(Pretrained, nn.Module):
 
     name: ClassVar[str] = "predator"
     config_type: ClassVar[type] = PredatorConfig
+    sizes: ClassVar[tuple[str, ...]] = tuple(SIZES)
+    loss_names: ClassVar[tuple[str, ...]] = ("circle", "overlap", "saliency")
     named_config = staticmethod(named_config)
+    example = staticmethod(example)
 
     def __init__(self, config: PredatorConfig, seed: int = 0) -> None:
         super().__init__()
@@ -79,6 +84,11 @@ class PredatorNetwork(Pretrained, nn.Module):
         self.score = nn.Linear(dim, 1)
         self.decoder = KpfcnnDecoder(config.backbone, config.decoder_dim, config.final_dim + 2)
         nn.init.zeros_(self.score.bias)  # by which `untrained` tells
+
+    @classmethod
+    def seeded(cls, config: PredatorConfig, seed: int) -> PredatorNetwork:
+        """A network of random weights; the seed turns the kernel points."""
+        return cls(config, seed)
 
     def forward(self, batch: Batch) -> PredatorOutput:
         """Features and scores of all points of a pair."""
@@ -148,7 +158,7 @@ class PredatorNetwork(Pretrained, nn.Module):
 
     @classmethod
     def load_official(
-        cls, path: str | os.PathLike[str], config: PredatorConfig | str | None = None
+        cls, path: str | os.PathLike[str], size: PredatorConfig | str | None = None
     ) -> PredatorNetwork:
         """The network of a published checkpoint, in evaluation mode.
 
@@ -156,7 +166,7 @@ class PredatorNetwork(Pretrained, nn.Module):
         ----------
         path
             A ``.pth`` as published, or a bare state dict saved by ``torch.save``. Read with ``weights_only``.
-        config
+        size
             A configuration or its name; by default ``predator-kitti`` or ``predator-3dmatch``, whichever has the
             search radius that the kernel points tell. Weights older than June 2021 fit in shape but were trained with
             a fault that is mended (its issue 15): they match less well here.
@@ -167,7 +177,7 @@ class PredatorNetwork(Pretrained, nn.Module):
             No such file; not a checkpoint of this network, with the wrong tensor named.
         """
         tensors = read_checkpoint(path).tensors
-        chosen = config_name(tensors, str(path)) if config is None else config
-        network = cls(named_config(chosen) if isinstance(chosen, str) else chosen)
-        load_stacked(network, tensors, str(path), official_name)
+        size = config_name(tensors, str(path)) if size is None else size
+        network = cls(named_config(size) if isinstance(size, str) else size)
+        load_official_tensors(network, tensors, str(path), official_name)
         return network.eval()

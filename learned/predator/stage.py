@@ -14,7 +14,7 @@ from hybridreg.matches import Correspondences, Overlap
 from hybridreg.scene import Level, Scene
 
 if TYPE_CHECKING:
-    from hybridreg.learned.predator.network import PredatorCloud, PredatorNetwork, PredatorOutput
+    from hybridreg.learned.predator.network import PredatorCloud, PredatorOutput
 
 Array = NDArray[np.float64]
 
@@ -26,15 +26,9 @@ _FEWEST = 100
 class _PredatorStage(StackedStage):
     kind: ClassVar[str] = "predator"
 
-    def network(self) -> PredatorNetwork:  # type: ignore[override]
-        """The network in evaluation mode, read when it is first asked for; errors as `from_pretrained`."""
-        return super().network()  # type: ignore[return-value]
-
     def output(self, scene: Scene) -> PredatorOutput:
         """What the network says about a pair: computed once a run for all stages of the same network."""
-        from hybridreg.learned.stages.encoding import note_random
-
-        note_random(scene, self)
+        self.note_random(scene)
         return scene.shared(("output", self.network_name()), lambda: self._run(scene))
 
     def _run(self, scene: Scene) -> PredatorOutput:

@@ -155,8 +155,8 @@ def _nano() -> RoitrConfig:
 SIZES: dict[str, Callable[[], RoitrConfig]] = {
     "nano": _nano,
     "small": _small,
-    "3dmatch": RoitrConfig,
-    "4dmatch": _4dmatch,
+    "roitr-3dmatch": RoitrConfig,
+    "roitr-4dmatch": _4dmatch,
 }
 
 
@@ -166,7 +166,8 @@ def named_config(name: str) -> RoitrConfig:
     Parameters
     ----------
     name
-        ``nano``, ``small`` (outdoor, ours), ``3dmatch`` or ``4dmatch`` (as published: 10.1 M and 40.3 M parameters).
+        ``nano``, ``small`` (outdoor, ours), ``roitr-3dmatch`` or ``roitr-4dmatch`` (as published: 10.1 M and 40.3 M
+        parameters).
 
     Raises
     ------
@@ -174,5 +175,5 @@ def named_config(name: str) -> RoitrConfig:
         An unknown name; the message lists the known ones.
     """
     if name not in SIZES:
-        raise KeyError(f"RoITr: unknown size {name!r}; known are {', '.join(SIZES)}")
+        raise KeyError(f"unknown size {name!r} of RoITr; known are {', '.join(SIZES)}")
     return SIZES[name]()

@@ -26,6 +26,16 @@ class RoitrLosses:
     fine: Tensor
     total: Tensor  # with the configuration's weights
 
+    @property
+    def parts(self) -> dict[str, Tensor]:
+        """Before they are weighed, for the log."""
+        return {"coarse": self.coarse, "fine": self.fine}
+
+    @property
+    def hits(self) -> Tensor | None:
+        """They do not tell."""
+        return None
+
 
 def losses(network: RoitrNetwork, output: RoitrOutput | RoitrEncoding, targets: RoitrTargets) -> RoitrLosses:
     """Losses of a training step: the fine part looks at the drawn true pairs of patches (lib/loss.py).

@@ -3,13 +3,12 @@
 
 from __future__ import annotations
 
-from hybridreg.learned.memory import available_bytes
+from hybridreg.learned.memory import SLACK
 from hybridreg.learned.roitr.batch import RoitrBatch
 from hybridreg.learned.roitr.config import RoitrConfig
 from hybridreg.learned.roitr.levels import Levels
 
 _FLOAT = 4
-_SLACK = 2**26  # what the heap holds beside what is in use
 _GATHERED = 3  # of (neighbours, C) tensors alive at a time: keys or values, their product, one temporary
 
 
@@ -28,26 +27,8 @@ def forward_bytes(batch: RoitrBatch, config: RoitrConfig) -> int:
     per_pair = (transformer.hidden_dim + 4 * transformer.heads) * _FLOAT
     attention = sum(n * n for n in nodes) * per_pair + max(nodes) ** 2 * transformer.hidden_dim * _FLOAT
     fine = sum(len(cloud.points[0]) for cloud in clouds) * config.fine_dim * _FLOAT * 2
-    return _SLACK + max(local, attention) + kept + ppf + fine
+    return SLACK + max(local, attention) + kept + ppf + fine
 
 
 def _level_bytes(cloud: Levels, level: int, config: RoitrConfig) -> int:
     return cloud.neighbors[level].numel() * config.inner[level] * _FLOAT * _GATHERED
-
-
-def require_memory(batch: RoitrBatch, config: RoitrConfig) -> None:
-    """Refuse a forward pass that would not fit.
-
-    Raises
-    ------
-    ValueError
-        The estimate exceeds what is free; the message names the points, both figures and the cure.
-    """
-    needed, free = forward_bytes(batch, config), available_bytes(batch.target.points[0].device)
-    if free is None or needed <= free:
-        return
-    target, source = (len(cloud.points[0]) for cloud in (batch.target, batch.source))
-    raise ValueError(
-        f"RoITr would take about {needed / 1e9:.2g} GB for {target} target and {source} source points, and "
-        f"{free / 1e9:.2g} GB are free: use a network with a voxel larger than {config.voxel:g} m, or crop the clouds"
-    )

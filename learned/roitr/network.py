@@ -4,23 +4,24 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar, Literal, NamedTuple
+from typing import ClassVar, Literal, NamedTuple
 
 import torch
 from torch import Tensor, nn
 from torch.nn import functional as F
 
 from hybridreg.learned.blocks import pad_row
-from hybridreg.learned.network import CloudEncoding
-from hybridreg.learned.own_network import OwnNetwork, load_by_names, read_state
+from hybridreg.learned.checkpoints import read_checkpoint
+from hybridreg.learned.encodings import CloudEncoding
 from hybridreg.learned.patch_pairs import PatchPairs, pair_patches, size_chunks
 from hybridreg.learned.patches import build_patches
 from hybridreg.learned.point_matching import PointMatches, gather_matches
+from hybridreg.learned.pretrained import Pretrained
 from hybridreg.learned.roitr.backbone import RoitrBackbone
 from hybridreg.learned.roitr.batch import RoitrBatch
-from hybridreg.learned.roitr.config import RoitrConfig, named_config
+from hybridreg.learned.roitr.config import SIZES, RoitrConfig, named_config
+from hybridreg.learned.roitr.examples import example
 from hybridreg.learned.roitr.global_transformer import GlobalTransformer
 from hybridreg.learned.roitr.levels import Levels
 from hybridreg.learned.roitr.losses import RoitrLosses, losses
@@ -30,6 +31,7 @@ from hybridreg.learned.roitr.official_names import official_name, unused_names
 from hybridreg.learned.roitr.targets import RoitrTargets
 from hybridreg.learned.sinkhorn import OptimalTransport
 from hybridreg.learned.superpoint_matching import SuperpointMatches, match_superpoints
+from hybridreg.learned.weights import load_official_tensors
 
 
 class RoitrEncoding(NamedTuple):
@@ -49,7 +51,7 @@ class RoitrOutput:
     matches: PointMatches
 
 
-class RoitrNetwork(OwnNetwork):
+class RoitrNetwork(Pretrained):
     """The whole network (model/RIGA_v2.py). No part of it takes a ground truth.
 
     Parameters
@@ -58,7 +60,12 @@ class RoitrNetwork(OwnNetwork):
         The network; `hybridreg.learned.roitr.config.named_config` has those by name.
     """
 
-    kind: ClassVar[str] = "roitr"
+    name: ClassVar[str] = "roitr"
+    config_type: ClassVar[type] = RoitrConfig
+    sizes: ClassVar[tuple[str, ...]] = tuple(SIZES)
+    loss_names: ClassVar[tuple[str, ...]] = ("coarse", "fine")
+    named_config = staticmethod(named_config)
+    example = staticmethod(example)
 
     def __init__(self, config: RoitrConfig) -> None:
         super().__init__()
@@ -71,16 +78,6 @@ class RoitrNetwork(OwnNetwork):
         self.transport = OptimalTransport(config.matching.sinkhorn_iterations)
 
     @classmethod
-    def build(cls, values: Mapping[str, Any]) -> RoitrNetwork:
-        """A network of random weights from a configuration's plain values."""
-        return cls(RoitrConfig.from_dict(values))
-
-    @classmethod
-    def named(cls, size: str) -> RoitrNetwork:
-        """A network of random weights: ``nano``, ``small``, ``3dmatch`` or ``4dmatch``."""
-        return cls(named_config(size))
-
-    @classmethod
     def load_official(
         cls, path: str | os.PathLike[str], size: RoitrConfig | str | None = None
     ) -> RoitrNetwork:
@@ -91,7 +88,8 @@ class RoitrNetwork(OwnNetwork):
         path
             A file of ``torch.save``: a dict with ``state_dict``, as published, or a bare state dict.
         size
-            A configuration or its name; by default ``3dmatch`` or ``4dmatch``, whichever has the first layer's width.
+            A configuration or its name; by default ``roitr-3dmatch`` or ``roitr-4dmatch``, whichever has
+            the first layer's width.
 
         Raises
         ------
@@ -100,19 +98,15 @@ class RoitrNetwork(OwnNetwork):
         ValueError
             Not a checkpoint of this network: the wrong tensor is named.
         """
-        tensors = read_state(path, "state_dict")
+        tensors = read_checkpoint(path).tensors
         if size is None:
             first = tensors.get("fine_proj.weight")
             wide = first is not None and first.dim() == 2 and first.shape[1] == 128
-            size = "4dmatch" if wide else "3dmatch"
+            size = "roitr-4dmatch" if wide else "roitr-3dmatch"
         network = cls(named_config(size) if isinstance(size, str) else size)
-        network.load_official_tensors(tensors, str(path))
+        unused = unused_names(network.state_dict())
+        load_official_tensors(network, tensors, str(path), official_name, unused)
         return network.eval()
-
-    def load_official_tensors(self, tensors: Mapping[str, Tensor], origin: str) -> None:
-        """Load tensors that bear the checkpoint's names, strictly; those that no computation reads must be there."""
-        names = {name: official_name(name) for name in self.state_dict()}
-        load_by_names(self, tensors, names, unused_names(names), origin)
 
     def forward(self, batch: RoitrBatch) -> RoitrOutput:
         """Encode both clouds, match superpoints, match points."""
@@ -128,6 +122,10 @@ class RoitrNetwork(OwnNetwork):
     def memory(self, batch: RoitrBatch) -> int:
         """Predicted peak of a forward pass in bytes, beside what the process and the batch hold already."""
         return forward_bytes(batch, self.config)
+
+    def training_output(self, batch: RoitrBatch) -> RoitrEncoding:
+        """`encode` alone: no match takes part in the losses."""
+        return self.encode(batch)
 
     def encode(self, batch: RoitrBatch) -> RoitrEncoding:
         """Target and source with unit superpoint features, fine features and patches."""

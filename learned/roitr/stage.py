@@ -9,14 +9,15 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from hybridreg.learned.stages.own_network_stage import OwnNetworkStage, on_grid
+from hybridreg.learned.stages.network_grid import on_grid
+from hybridreg.learned.stages.network_stage import NetworkStage
 from hybridreg.matches import Correspondences, Overlap
 from hybridreg.scene import Level, Scene
 
 if TYPE_CHECKING:
     from torch import Tensor
 
-    from hybridreg.learned.network import CloudEncoding
+    from hybridreg.learned.encodings import CloudEncoding
     from hybridreg.learned.roitr.network import RoitrNetwork
 
 Array = NDArray[np.float64]
@@ -26,7 +27,7 @@ _FEWEST = 4
 
 
 @dataclass(frozen=True, kw_only=True)
-class Roitr(OwnNetworkStage):
+class Roitr(NetworkStage):
     """Superpoints and points matched by features that no rotation changes (Yu et al., CVPR 2023).
 
     Needs oriented normals: they are estimated from 33 neighbours and turned to the frame's origin for the published
@@ -40,7 +41,7 @@ class Roitr(OwnNetworkStage):
 
     min_overlap: float = 0.5
 
-    NETWORK: ClassVar[str] = "hybridreg.learned.roitr.network:RoitrNetwork"
+    kind: ClassVar[str] = "roitr"
     gives: ClassVar[frozenset[str]] = frozenset({"matches", "group"})
     parts: ClassVar[frozenset[str]] = frozenset({"backbone", "transformer"})
 
@@ -52,11 +53,11 @@ class Roitr(OwnNetworkStage):
     def __call__(self, scene: Scene, overlap: Overlap) -> Correspondences:
         import torch
 
+        from hybridreg.learned.memory import require_bytes
         from hybridreg.learned.roitr.batch import make_batch
-        from hybridreg.learned.roitr.memory import require_memory
         from hybridreg.learned.stages.arrays import array
 
-        network: RoitrNetwork = self.network()  # type: ignore[assignment]
+        network: RoitrNetwork = self.network()
         self.note_random(scene)
         config = network.config
         clouds = [
@@ -65,7 +66,8 @@ class Roitr(OwnNetworkStage):
         ]
         viewpoints = (scene.target.viewpoint, scene.source.viewpoint)
         batch = make_batch(clouds[0], clouds[1], config, viewpoints=viewpoints, device=self.device)
-        require_memory(batch, config)
+        cure = f"use weights with a voxel larger than {config.voxel:g} m, or crop the clouds"
+        require_bytes(network.memory(batch), (len(clouds[0]), len(clouds[1])), self.device, cure)
         with torch.inference_mode():
             target, source = network.encode(batch)
             kept = (

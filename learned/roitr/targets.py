@@ -26,6 +26,10 @@ class RoitrTargets:
     overlap: Tensor  # (G,) in (0, 1]
     drawn: Tensor  # (g,) int64 into the G pairs
 
+    def to(self, device: torch.device | str) -> RoitrTargets:
+        """The same targets on another device."""
+        return RoitrTargets(**{name: value.to(device) for name, value in vars(self).items()})
+
 
 def compute_targets(
     batch: RoitrBatch, transform: Tensor, config: RoitrConfig, generator: torch.Generator | None = None

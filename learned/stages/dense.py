@@ -27,7 +27,6 @@ class DenseFeatures(NetworkStage):
 
     min_overlap: float = 0.5
 
-    image: ClassVar[bool] = False
     gives: ClassVar[frozenset[str]] = frozenset({"matches"})
     parts: ClassVar[frozenset[str]] = frozenset({"backbone"})
 

@@ -3,30 +3,31 @@
 
 from __future__ import annotations
 
-import math
+from typing import TYPE_CHECKING
 
 import torch
 
 from hybridreg.learned.batch import Batch, make_batch
+from hybridreg.learned.encodings import Encoding
 from hybridreg.learned.memory import require_memory
-from hybridreg.learned.network import Encoding
 from hybridreg.learned.stages.levelling import Turns, likeness
+from hybridreg.learned.stages.network_grid import note_grid
 from hybridreg.learned.stages.network_stage import NetworkStage
 from hybridreg.scene import Scene
 from hybridreg.threads import single
 
-# Spacings that differ by less are one; beyond the second factor the scene itself may be of another size.
-_SAME, _ANOTHER_SCALE = 0.01, 2.0
+if TYPE_CHECKING:
+    from hybridreg.learned.network import RegistrationNetwork
 
 
 def encode(scene: Scene, stage: NetworkStage) -> Encoding:
     """The pair after the encoders of a stage's network."""
-    note_random(scene, stage)
+    stage.note_random(scene)
     return scene.shared(("encoding", stage.network_name()), lambda: _encode(scene, stage))
 
 
 def _encode(scene: Scene, stage: NetworkStage) -> Encoding:
-    network = stage.network()
+    network: RegistrationNetwork = stage.network()
     if network.image_encoder is not None and not (stage.sees() and scene.pair.has_image):
         why = "no image" if not scene.pair.has_image else "the network was trained without images"
         scene.note(f"{why}: features come from the clouds alone, a learned token in the image's place")
@@ -43,7 +44,7 @@ def _encode(scene: Scene, stage: NetworkStage) -> Encoding:
 
 def _encode_turned(scene: Scene, stage: NetworkStage, turns: Turns) -> Encoding:
     batch = _batch(scene, stage, turns)
-    network = stage.network()
+    network: RegistrationNetwork = stage.network()
     require_memory(batch.pyramid, network.config)
     return turns.back(network.encode(batch))
 
@@ -63,27 +64,3 @@ def _batch(scene: Scene, stage: NetworkStage, turns: Turns) -> Batch:
         subsample=not ready,
         device=stage.device,
     )
-
-
-def note_random(scene: Scene, stage: NetworkStage) -> None:
-    """Leave a note where a stage runs although its weights are random."""
-    if stage.random_parts():
-        scene.note(f"{type(stage).__name__} ran with random weights (untrained=True)")
-
-
-def note_grid(scene: Scene, voxel: float) -> bool:
-    """Have both levels the spacing that a network was trained with? Leave a note where they have not."""
-    ready = all(math.isclose(s, voxel, rel_tol=_SAME) for s in (scene.source.spacing, scene.target.spacing))
-    if not ready:
-        scene.note(_mismatch(scene.spacing, voxel))
-    return ready
-
-
-def _mismatch(spacing: float, voxel: float) -> str:
-    text = (
-        f"the network was trained with a voxel of {voxel:.3g} m and put the clouds on a grid of its own; the other "
-        f"stages work at {spacing:.3g} m"
-    )
-    if max(spacing / voxel, voxel / spacing) > _ANOTHER_SCALE:
-        return f"{text}: is the scene of the size that the network was trained for?"
-    return text

@@ -3,15 +3,12 @@
 
 from __future__ import annotations
 
-import os
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING
 
 from hybridreg.learned.stages.network_matcher import NetworkMatcher
 
 if TYPE_CHECKING:
-    from typing_extensions import Self
-
     from hybridreg.learned.network import RegistrationNetwork
 
 
@@ -22,21 +19,6 @@ class GeoTransformer(NetworkMatcher):
     Weights whose configuration says `self_attention="vanilla"` run without the geometric embedding. Weights with
     an overlapping mask predictor fit too: it takes part through the overlap stage alone.
     """
-
-    image: ClassVar[bool] = False
-
-    @classmethod
-    def load_official(cls, path: str | os.PathLike[str], **fields: Any) -> Self:
-        """Stage of a checkpoint that GeoTransformer's authors published (KITTI or 3DMatch), read at once.
-
-        Raises
-        ------
-        FileNotFoundError
-            No such file.
-        ValueError
-            Not a checkpoint of this network: the wrong tensor is named.
-        """
-        return cls.from_pretrained(path, **fields)
 
     def check(self, network: RegistrationNetwork) -> None:
         """Refuse weights that were trained to look at the image."""

@@ -11,7 +11,7 @@ import torch
 from numpy.typing import NDArray
 
 from hybridreg.learned.config import NetworkConfig, OmpConfig
-from hybridreg.learned.network import CloudEncoding, Encoding
+from hybridreg.learned.encodings import CloudEncoding, Encoding
 from hybridreg.learned.stages.arrays import array
 from hybridreg.learned.stages.spreading import gather
 from hybridreg.learned.superpoint_mask import Kept, choose

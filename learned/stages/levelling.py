@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from torch.nn import functional as F
 
 from hybridreg import ground
-from hybridreg.learned.network import CloudEncoding, Encoding
+from hybridreg.learned.encodings import CloudEncoding, Encoding
 from hybridreg.learned.superpoint_evidence import partners
 from hybridreg.scene import Scene
 

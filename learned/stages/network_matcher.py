@@ -47,7 +47,8 @@ class NetworkMatcher(NetworkStage):
         from hybridreg.learned.stages.encoding import encode
         from hybridreg.learned.stages.kept_superpoints import keep
 
-        network, encoding = self.network(), encode(scene, self)
+        network: RegistrationNetwork = self.network()
+        encoding = encode(scene, self)
         with single(), torch.inference_mode():
             kept = keep(scene, overlap, encoding, network.config, self.min_overlap)
             features = network.attend(encoding, kept)

@@ -12,22 +12,22 @@ from hybridreg.stage import Stage
 if TYPE_CHECKING:
     from typing_extensions import Self
 
-    from hybridreg.learned.network import RegistrationNetwork
     from hybridreg.learned.stages.networks import Loaded, NetworkName
+    from hybridreg.scene import Scene
 
 
 @dataclass(frozen=True, kw_only=True)
 class NetworkStage(Stage):
-    """A stage with a network behind it.
+    """A stage with a network behind it: the one that ``kind`` names in `hybridreg.learned.network_table`.
 
     Parameters
     ----------
     weights : str or None
-        A folder that `save_pretrained` wrote, the name of weights that come with the package, or one of
-        GeoTransformer's published checkpoints (`.pth.tar`). None stands for random weights.
+        A folder that `save_pretrained` wrote, the name of weights that come with the package, or a checkpoint that
+        the network's authors published (`.pth`, `.tar`, `.pkl`). None stands for random weights.
     size : str or None
-        Configuration by name, see `hybridreg.learned.sizes.named_config`: of random weights ("nano" if not
-        given), or of a checkpoint (found from its tensors if not given). Folders bring their own.
+        Configuration by name (`hybridreg list networks`): of random weights ("nano" if not given), or of a checkpoint
+        (found from its tensors if not given). Folders bring their own.
     device : str
         As torch names it: "cpu", "cuda", "cuda:1".
     untrained : bool
@@ -39,9 +39,10 @@ class NetworkStage(Stage):
     device: str = "cpu"
     untrained: bool = False
 
+    kind: ClassVar[str] = "cross3dreg"
     # Parts that must have been trained, and whether a network of random weights looks at images.
     parts: ClassVar[frozenset[str]] = frozenset({"backbone"})
-    image: ClassVar[bool] = True
+    image: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
         if self.weights is not None:
@@ -67,39 +68,55 @@ class NetworkStage(Stage):
         stage.network()
         return stage
 
+    @classmethod
+    def load_official(cls, path: str | os.PathLike[str], **fields: Any) -> Self:
+        """Stage of a checkpoint that the network's authors published, read at once.
+
+        Raises
+        ------
+        FileNotFoundError
+            No such file.
+        ValueError
+            Not a checkpoint of this network: the wrong tensor is named.
+        """
+        return cls.from_pretrained(path, **fields)
+
     def save_pretrained(self, folder: str | os.PathLike[str]) -> None:
         """Write the network's weights and configuration into a folder."""
-        from hybridreg.learned.weights import save_pretrained
+        self.network().save_pretrained(folder)
 
-        save_pretrained(self.network(), folder)
-
-    def network(self) -> RegistrationNetwork:
-        """The network in evaluation mode, read when it is first asked for.
+    def network(self) -> Any:
+        """The network in evaluation mode, of the class that ``kind`` stands for, read when it is first asked for.
 
         Raises
         ------
         ValueError
             As `from_pretrained`.
         """
-        loaded = self._load()
-        self.check(loaded.network)
+        network = self._load().network
+        self.check(network)
         random = self.random_parts()
         if random and not self.untrained:
             raise ValueError(
                 f"{type(self).__name__}: these weights are random: {', '.join(random)} of {self.weights!r} was never "
                 "trained; name other weights, or insist with untrained=True"
             )
-        return loaded.network
+        return network
 
     def random_parts(self) -> list[str]:
         """Those of this stage's parts that were never trained."""
         return sorted(self.parts & self._load().untrained)
 
+    def note_random(self, scene: Scene) -> None:
+        """Leave a note where this stage runs although its weights are random."""
+        if self.random_parts():
+            scene.note(f"{type(self).__name__} ran with random weights (untrained=True)")
+
     def sees(self) -> bool:
         """Has the network learned to look at images? One that is random altogether counts as if it had."""
         loaded = self._load()
         blind = "image_encoder" in loaded.untrained and "backbone" not in loaded.untrained
-        return loaded.network.image_encoder is not None and not blind
+        return getattr(loaded.network, "image_encoder", None) is not None and not blind
 
     def _load(self) -> Loaded:
         from hybridreg.learned.stages.networks import load
@@ -110,7 +127,12 @@ class NetworkStage(Stage):
         """What tells this stage's network from others; stages of one name share one encoding of a pair."""
         from hybridreg.learned.stages.networks import NetworkName
 
-        return NetworkName(self.weights, self.size, self.device, self.weights is None and self.image)
+        image = self.weights is None and self.image
+        return NetworkName(self.kind, self.weights, self.size, self.device, image, self.told())
 
-    def check(self, network: RegistrationNetwork) -> None:
+    def told(self) -> tuple[tuple[str, Any], ...]:
+        """What a published checkpoint cannot tell, by the names that `load_official` of the network takes."""
+        return ()
+
+    def check(self, network: Any) -> None:
         """Refuse a network that lacks what this stage runs."""

@@ -4,21 +4,18 @@
 from __future__ import annotations
 
 from functools import lru_cache
-from importlib import import_module
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import torch
 
-from hybridreg.learned.network import RegistrationNetwork
-from hybridreg.learned.pretrained import network_class
-from hybridreg.learned.sizes import named_config
-from hybridreg.learned.untrained import untrained_parts
-from hybridreg.learned.weights import find_files, from_pretrained, load_official
+from hybridreg.learned.checkpoints import is_checkpoint
+from hybridreg.learned.network_table import network_class
+from hybridreg.learned.pretrained import Pretrained
+from hybridreg.learned.weights import find_files
 from hybridreg.threads import single
 
 _DEFAULT_SIZE = "nano"
-_CHECKPOINTS = (".tar", ".pth", ".pt", ".pkl")
 # Networks held at a time: OMP and a matcher of other weights, each beside the one before it.
 _HELD = 4
 
@@ -26,18 +23,18 @@ _HELD = 4
 class NetworkName(NamedTuple):
     """All that tells one network from another."""
 
+    network: str  # as `hybridreg.learned.network_table` knows it
     weights: str | None  # a folder, the name of shipped weights, a checkpoint; None for random weights
     size: str | None
     device: str
-    image: bool  # of a network of random weights: has it OMP and VGAM?
-    network: str | None = None  # as `hybridreg.learned.pretrained` knows it; None for `RegistrationNetwork`
-    options: tuple[tuple[str, Any], ...] = ()  # what a published checkpoint cannot tell
+    image: bool = False  # of a network of random weights: has it OMP and VGAM?
+    told: tuple[tuple[str, Any], ...] = ()  # what a published checkpoint cannot tell
 
 
 class Loaded(NamedTuple):
     """A network in evaluation mode, and which of its parts were never trained."""
 
-    network: RegistrationNetwork
+    network: Pretrained
     untrained: frozenset[str]
 
 
@@ -54,6 +51,11 @@ def load(name: NetworkName) -> Loaded:
     return _load(name, _stamp(name.weights))
 
 
+def forget() -> None:
+    """Let go of all networks that are held."""
+    _load.cache_clear()
+
+
 @lru_cache(maxsize=_HELD)
 def _load(name: NetworkName, stamp: tuple[int, ...]) -> Loaded:
     try:
@@ -66,53 +68,21 @@ def _load(name: NetworkName, stamp: tuple[int, ...]) -> Loaded:
     with single(), torch.random.fork_rng(devices=[]):
         torch.default_generator.manual_seed(0)
         network = _make(name)
-    untrained = network.untrained() if hasattr(network, "untrained") else untrained_parts(network)
+    untrained = network.untrained()
     return Loaded(network.to(name.device).eval().requires_grad_(False), untrained)
 
 
-def _make(name: NetworkName) -> Any:
-    if name.network is not None:
-        return _make_other(name)
+def _make(name: NetworkName) -> Pretrained:
+    cls = network_class(name.network)
     if name.weights is None:
-        return RegistrationNetwork(named_config(name.size or _DEFAULT_SIZE, omp=name.image, vgam=name.image))
+        parts = {"omp": True, "vgam": True} if name.image else {}
+        return cls.named(name.size or _DEFAULT_SIZE, **parts)
     if is_checkpoint(name.weights):
-        return load_official(name.weights, name.size)
-    if name.size is not None:
-        raise ValueError(f"size={name.size!r}: the weights {name.weights!r} bring their own configuration")
-    return from_pretrained(name.weights)
-
-
-def _make_other(name: NetworkName) -> Any:
-    if ":" in (name.network or ""):
-        return _make_own(name)
-    cls = network_class(name.network or "")
-    if name.weights is None:
-        return cls(cls.named_config(name.size or _DEFAULT_SIZE))
-    if name.size is not None:
-        raise ValueError(f"size={name.size!r}: the weights {name.weights!r} tell their own configuration")
-    if is_checkpoint(name.weights):
-        return cls.load_official(name.weights, **dict(name.options))
-    told = [f"{key}={value!r}" for key, value in name.options if value is not None]
+        return cls.load_official(name.weights, name.size, **dict(name.told))
+    told = [f"{key}={value!r}" for key, value in (("size", name.size), *name.told) if value is not None]
     if told:
         raise ValueError(f"{', '.join(told)}: the weights {name.weights!r} bring their own configuration")
     return cls.from_pretrained(name.weights)
-
-
-def _make_own(name: NetworkName) -> Any:
-    module, _, attribute = str(name.network).partition(":")
-    cls = getattr(import_module(module), attribute)
-    if name.weights is None:
-        return cls.named(name.size or _DEFAULT_SIZE)
-    if is_checkpoint(name.weights):
-        return cls.load_official(name.weights, name.size)
-    if name.size is not None:
-        raise ValueError(f"size={name.size!r}: the weights {name.weights!r} bring their own configuration")
-    return cls.from_pretrained(name.weights)
-
-
-def is_checkpoint(weights: str) -> bool:
-    """Is it the name of a published checkpoint, not of a folder?"""
-    return weights.endswith(_CHECKPOINTS)
 
 
 def _stamp(weights: str | None) -> tuple[int, ...]:

@@ -24,6 +24,7 @@ class Omp(NetworkStage):
     nothing, and every point counts.
     """
 
+    image: ClassVar[bool] = True
     parts: ClassVar[frozenset[str]] = frozenset({"backbone", "omp"})
 
     def __call__(self, scene: Scene) -> Overlap:
@@ -33,7 +34,8 @@ class Omp(NetworkStage):
         from hybridreg.learned.stages.encoding import encode
         from hybridreg.learned.stages.spreading import spread
 
-        network, encoding = self.network(), encode(scene, self)
+        network: RegistrationNetwork = self.network()
+        encoding = encode(scene, self)
         with single(), torch.inference_mode():
             logits = network.predict_overlap(encoding)
             assert logits is not None, "check() lets no network without OMP through"

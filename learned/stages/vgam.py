@@ -19,6 +19,7 @@ class Vgam(NetworkMatcher):
     Works without an image too, from the clouds alone.
     """
 
+    image: ClassVar[bool] = True
     parts: ClassVar[frozenset[str]] = frozenset({"backbone", "vgam", "transformer"})
 
     def check(self, network: RegistrationNetwork) -> None:

@@ -14,10 +14,12 @@ import torch
 from hybridreg import __version__
 from hybridreg.data.dataset import fingerprint_of
 from hybridreg.io.atomic import write_text
+from hybridreg.learned.network_table import DEFAULT
 from hybridreg.learned.training.checkpoint import Progress
 from hybridreg.learned.training.log import CurveFile
-from hybridreg.learned.training.pair_source import PairSource
+from hybridreg.learned.training.opened_source import OpenedSource
 from hybridreg.learned.training.recipe import Recipe
+from hybridreg.learned.training.stage_validation import estimator_of
 
 _FIGURES = ("pairs", "recall", "rre_deg", "rte_m", "inlier_ratio", "pir", "mask_f1")
 
@@ -25,8 +27,8 @@ _FIGURES = ("pairs", "recall", "rre_deg", "rte_m", "inlier_ratio", "pir", "mask_
 def make_card(
     recipe: Recipe,
     progress: Progress,
-    train: Sequence[PairSource],
-    val: Sequence[PairSource],
+    train: Sequence[OpenedSource],
+    val: Sequence[OpenedSource],
     validations: CurveFile,
     parameters: int,
     device: str,
@@ -39,6 +41,7 @@ def make_card(
         "python": platform.python_version(),
         "device": device,
         "parameters": parameters,
+        "estimator": "LGR" if recipe.kind == DEFAULT else estimator_of(recipe.kind),
         "steps": progress.total,
         "hours": round(progress.seconds / 3600.0, 3),
         "seed": recipe.seed,
@@ -56,7 +59,7 @@ def write_card(folder: Path, card: Mapping[str, Any]) -> None:
     write_text(folder / "card.md", "\n".join(_lines(card)) + "\n")
 
 
-def _data(source: PairSource) -> dict[str, Any]:
+def _data(source: OpenedSource) -> dict[str, Any]:
     return {"name": source.title, "pairs": len(source), "fingerprint": fingerprint_of(source.pairs)}
 
 
@@ -77,7 +80,7 @@ def _lines(card: Mapping[str, Any]) -> list[str]:
         f"Trained on {data}.",
         f"hybridreg {card['hybridreg']}, torch {card['torch']}. The recipe is in `card.json`.",
         "",
-        "Validation of these weights (protocol cross3dreg, LGR, no refinement):",
+        f"Validation of these weights (protocol cross3dreg, {card['estimator']}, no refinement):",
         "",
         "| data | " + " | ".join(_FIGURES) + " |",
         "|---" * (len(_FIGURES) + 1) + "|",

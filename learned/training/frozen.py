@@ -10,7 +10,8 @@ from torch import Tensor
 
 from hybridreg.learned.batch import Batch
 from hybridreg.learned.config import BackboneConfig
-from hybridreg.learned.network import Known, RegistrationNetwork
+from hybridreg.learned.encodings import Known
+from hybridreg.learned.network import RegistrationNetwork
 from hybridreg.learned.training.augmentation import Augmentation
 from hybridreg.learned.training.recipe import Phase
 

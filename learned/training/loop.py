@@ -14,13 +14,15 @@ import torch
 from torch import nn
 
 from hybridreg.learned.network import RegistrationNetwork
+from hybridreg.learned.pretrained import Pretrained
 from hybridreg.learned.training import checkpoint
 from hybridreg.learned.training.checkpoint import Progress
+from hybridreg.learned.training.examples import Example, learn
 from hybridreg.learned.training.frozen import FrozenFeatures, lasting
 from hybridreg.learned.training.gradients import StepOutcome, finish_step
 from hybridreg.learned.training.objective import Outcome, objective
+from hybridreg.learned.training.opened_source import OpenedSource
 from hybridreg.learned.training.order import Order
-from hybridreg.learned.training.pair_source import PairSource
 from hybridreg.learned.training.recipe import Phase, Recipe
 from hybridreg.learned.training.record import Record
 from hybridreg.learned.training.samples import PhaseSamples, Sample, Unusable, stream
@@ -42,8 +44,8 @@ class Loop:
         self,
         fabric: Fabric,
         recipe: Recipe,
-        network: RegistrationNetwork,
-        sources: Sequence[PairSource],
+        network: Pretrained,
+        sources: Sequence[OpenedSource],
         out: Path,
         record: Record,
         stop: StopFlag,
@@ -72,8 +74,7 @@ class Loop:
         samples, steps = self._samples(phase, batch)
         parameters = trainable(optimizer)
         self.record.begin_phase(phase, steps)
-        keep = lasting(phase, self.recipe.augmentation, self.recipe.network.backbone)
-        self._frozen = FrozenFeatures(self.network, keep)
+        self._frozen = self._known(phase)
         upcoming = stream(samples, self._numbers(batch, steps), self.recipe.data.loaders)
         for step in range(self.progress.step, steps):
             set_rate(optimizer, rate_at(phase, step, steps))
@@ -95,34 +96,47 @@ class Loop:
         self,
         phase: Phase,
         samples: PhaseSamples,
-        upcoming: Iterator[Sample | Unusable],
+        upcoming: Iterator[Sample | Example | Unusable],
         first: int,
         batch: int,
     ) -> torch.Tensor:
         # Gradients of this process's share of the batch; 1 in the answer where a loss was not finite.
         bad = torch.zeros(batch, device=self.fabric.device)
-        for place in range(self.fabric.global_rank, batch, self.fabric.world_size):
+        for places in self._together(batch):
             with self.record.data_time():
-                sample = next(upcoming)
-            assert sample.number == first + place
-            if isinstance(sample, Unusable):
-                _log.warning("pair %s cannot be used: %s", sample.id, sample.problem)
-                bad[place] = 1.0
+                found = [next(upcoming) for _ in places]
+            assert [each.number for each in found] == [first + place for place in places]
+            usable = [each for each in found if not isinstance(each, Unusable)]
+            for place, each in zip(places, found, strict=True):
+                if isinstance(each, Unusable):
+                    _log.warning("pair %s cannot be used: %s", each.id, each.problem)
+                    bad[place] = 1.0
+            if len(usable) < len(found):
                 continue
-            pair = samples.order[sample.number]
-            outcome = self._forward(phase, sample.to(self.fabric.device), pair)
+            outcome = self._forward(phase, usable, samples)
             if bool(torch.isfinite(outcome.total)):
-                (outcome.total / batch).backward()
-                self.record.outcome(self.network, outcome, sample)
+                (outcome.total * len(places) / batch).backward()
+                self.record.outcome(self.network, outcome, usable[0])
             else:
-                bad[place] = 1.0
+                bad[places] = 1.0
         return bad
 
-    def _forward(self, phase: Phase, sample: Sample, pair: tuple[int, int]) -> Outcome:
-        seeds = np.random.SeedSequence([*self._seed(), 3, sample.number]).generate_state(2)
+    def _together(self, batch: int) -> list[list[int]]:
+        """Places of this process in a step's batch, those together that go through the network at once."""
+        mine = list(range(self.fabric.global_rank, batch, self.fabric.world_size))
+        return [mine] if self.network.together else [[place] for place in mine]
+
+    def _forward(self, phase: Phase, found: Sequence[Sample | Example], samples: PhaseSamples) -> Outcome:
+        seeds = np.random.SeedSequence([*self._seed(), 3, found[0].number]).generate_state(2)
         torch.manual_seed(int(seeds[0]))  # for what the network itself draws: images left out
         generator = torch.Generator().manual_seed(int(seeds[1]))
+        here = [each.to(self.fabric.device) for each in found]
         with self.fabric.autocast():
+            if isinstance(here[0], Example):
+                return learn(self.network, [each for each in here if isinstance(each, Example)])
+            assert isinstance(self.network, RegistrationNetwork)
+            assert self._frozen is not None
+            sample = here[0]
             return objective(
                 self.network,
                 sample,
@@ -130,8 +144,14 @@ class Loop:
                 self.recipe.infonce,
                 MaskJitter(use_predicted=phase.use_predicted),
                 generator,
-                self._frozen.of(pair, sample.batch),
+                self._frozen.of(samples.order[sample.number], sample.batch),
             )
+
+    def _known(self, phase: Phase) -> FrozenFeatures | None:
+        if not isinstance(self.network, RegistrationNetwork):
+            return None
+        keep = lasting(phase, self.recipe.augmentation, self.recipe.network.backbone)
+        return FrozenFeatures(self.network, keep)
 
     def _samples(self, phase: Phase, batch: int) -> tuple[PhaseSamples, int]:
         weights = [

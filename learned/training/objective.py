@@ -9,9 +9,10 @@ import torch
 from torch import Tensor
 
 from hybridreg.learned.circle_loss import circle_loss
+from hybridreg.learned.encodings import Encoding, Known
 from hybridreg.learned.infonce_loss import InfoNceConfig, infonce
 from hybridreg.learned.losses import mask_loss, overlap_matrix
-from hybridreg.learned.network import Encoding, Known, RegistrationNetwork
+from hybridreg.learned.network import RegistrationNetwork
 from hybridreg.learned.superpoint_mask import Kept
 from hybridreg.learned.training.recipe import LossWeights
 from hybridreg.learned.training.samples import Sample

@@ -5,14 +5,17 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable, Iterator
+from typing import TypeVar
 
-from hybridreg.learned.training.pair_source import PairSource
+from hybridreg.learned.training.opened_source import OpenedSource
+from hybridreg.threads import one_thread
 from hybridreg.workers import spread
 
+Source = TypeVar("Source", bound=OpenedSource)
 _log = logging.getLogger(__name__)
 
 
-def prepare_all(source: PairSource, workers: int, on_pair: Callable[[], None] = lambda: None) -> PairSource:
+def prepare_all(source: Source, workers: int, on_pair: Callable[[], None] = lambda: None) -> Source:
     """The source without the pairs that cannot be prepared; those are logged by name.
 
     Raises
@@ -38,12 +41,10 @@ def prepare_all(source: PairSource, workers: int, on_pair: Callable[[], None] = 
     return source.only(usable)
 
 
-def _run(source: PairSource, missing: list[int], workers: int) -> Iterator[tuple[int, str | None]]:
+def _run(source: OpenedSource, missing: list[int], workers: int) -> Iterator[tuple[int, str | None]]:
     yield from spread(_prepare, ((source, index) for index in missing), workers)
 
 
-def _prepare(source: PairSource, index: int) -> tuple[int, str | None]:
-    from hybridreg.threads import one_thread
-
+def _prepare(source: OpenedSource, index: int) -> tuple[int, str | None]:
     with one_thread():
         return index, source.prepare(index)

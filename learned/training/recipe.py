@@ -7,8 +7,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
-from hybridreg.learned.config import NetworkConfig
 from hybridreg.learned.infonce_loss import InfoNceConfig
+from hybridreg.learned.network_table import DEFAULT, network_class
 from hybridreg.learned.training.augmentation import Augmentation
 
 
@@ -116,7 +116,8 @@ class Recipe:
 
     Attributes
     ----------
-    network : the network's complete configuration
+    network : the network's complete configuration; plain values of it, as in a card, become one
+    kind : the network's name in `hybridreg.learned.network_table`
     start : folder or name of trained weights; tensors of the same names are taken over
     every : steps between validations
     log_every : steps between lines of the log
@@ -124,9 +125,10 @@ class Recipe:
     """
 
     name: str
-    network: NetworkConfig
+    network: Any
     data: DataPlan
     phase: tuple[Phase, ...]
+    kind: str = DEFAULT
     seed: int = 0
     start: str = ""
     augmentation: Augmentation = field(default_factory=Augmentation)
@@ -138,6 +140,9 @@ class Recipe:
     precision: Literal["32-true", "bf16-mixed"] = "32-true"
 
     def __post_init__(self) -> None:
+        if isinstance(self.network, Mapping):
+            config = network_class(self.kind).config_type.from_dict(self.network)
+            object.__setattr__(self, "network", config)
         if not self.phase:
             raise ValueError("a recipe needs at least one [[phase]]")
         known = {source.title for source in self.data.train}
@@ -147,8 +152,21 @@ class Recipe:
                 raise ValueError(
                     f"phase {phase.name!r}: data names {unknown}; the training sources are {sorted(known)}"
                 )
-            if phase.losses.mask and self.network.omp is None and phase.losses.mask != 1.0:
+            if self.kind != DEFAULT:
+                self._check_other(phase)
+            elif phase.losses.mask and self.network.omp is None and phase.losses.mask != 1.0:
                 raise ValueError(f"phase {phase.name!r}: a mask loss is weighed, but the network has no OMP")
+
+    def _check_other(self, phase: Phase) -> None:
+        if phase.losses != LossWeights():
+            raise ValueError(
+                f"phase {phase.name!r}: losses has the parts of {DEFAULT}'s loss; {self.kind} weighs its own in "
+                "[network.loss]"
+            )
+        if phase.use_predicted:
+            raise ValueError(
+                f"phase {phase.name!r}: use_predicted is about OMP's mask, and {self.kind} has none"
+            )
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values, for checkpoints and cards."""

@@ -12,6 +12,7 @@ from typing import Any
 from hybridreg.io.structured import read_toml
 from hybridreg.learned import recipes
 from hybridreg.learned.config import NetworkConfig
+from hybridreg.learned.network_table import DEFAULT
 from hybridreg.learned.sizes import named_config
 from hybridreg.learned.training.recipe import Phase, Recipe
 from hybridreg.plain_values import build, value_of
@@ -51,15 +52,36 @@ def _content(name: str, behind: tuple[str, ...] = ()) -> dict[str, Any]:
 
 
 def parse(table: Mapping[str, Any], *, name: str) -> Recipe:
-    """The recipe of a file's content: ``size``, ``omp``, ``vgam`` choose the network, ``[network]`` alters it."""
+    """The recipe of a file's content.
+
+    ``network`` names the network, or is a table that alters it (``name`` in it is the name then); ``size``, and for
+    Cross3DReg ``omp`` and ``vgam``, choose its configuration.
+    """
     base: dict[str, Any] = {
         key: value_of(type(default), table.get(key, default), f"recipe.{key}")
         for key, default in _NETWORK_KEYS.items()
     }
-    altered = value_of(Mapping[str, Any], table.get("network", {}), "recipe.network")
-    network = network_of(base["size"], omp=base["omp"], vgam=base["vgam"], changes=altered)
-    rest = {key: value for key, value in table.items() if key not in _NETWORK_KEYS}
-    return build(Recipe, {"name": name, **rest, "network": network.to_dict()}, "recipe")
+    given = table.get("network", {})
+    altered = dict(
+        value_of(Mapping[str, Any], {"name": given} if isinstance(given, str) else given, "recipe.network")
+    )
+    kind = value_of(str, altered.pop("name", DEFAULT), "recipe.network.name")
+    if kind == DEFAULT:
+        network: Any = network_of(base["size"], omp=base["omp"], vgam=base["vgam"], changes=altered)
+    else:
+        parts = sorted({"omp", "vgam"} & set(table))
+        if parts:
+            raise ValueError(f"recipe.{parts[0]}: a part of {DEFAULT}, which {kind} has not")
+        network = _other_network(kind, base["size"], altered)
+    rest = {key: value for key, value in table.items() if key not in (*_NETWORK_KEYS, "kind")}
+    return build(Recipe, {"name": name, **rest, "network": network, "kind": kind}, "recipe")
+
+
+def _other_network(kind: str, size: str, changes: Mapping[str, Any]) -> Any:
+    from hybridreg.learned.network_table import network_class
+
+    cls = network_class(kind)
+    return cls.config_type.from_dict(_merged(cls.named_config(size).to_dict(), changes))
 
 
 def network_of(size: str, *, omp: bool, vgam: bool, changes: Mapping[str, Any]) -> NetworkConfig:

@@ -13,43 +13,47 @@ import torch
 from torch import Tensor
 
 from hybridreg.learned.network import RegistrationNetwork
+from hybridreg.learned.pretrained import Pretrained
 from hybridreg.learned.procrustes import apply_transform
 from hybridreg.learned.training.checkpoint import Progress
+from hybridreg.learned.training.examples import Example
 from hybridreg.learned.training.log import CurveFile, Value
 from hybridreg.learned.training.objective import Outcome
-from hybridreg.learned.training.pair_source import PairSource
+from hybridreg.learned.training.opened_source import OpenedSource
 from hybridreg.learned.training.recipe import Phase
 from hybridreg.learned.training.reporting import Reporter
 from hybridreg.learned.training.samples import Sample
 from hybridreg.learned.training.validation import PROTOCOL, Validation, pair_inlier_ratio, rank, validate
 from hybridreg.learned.weights import save_pretrained
 
-_MEANS = ("loss", "infonce", "coarse", "fine", "mask", "hits", "pir", "ir", "norm")
-_COLUMNS = ("phase", "step", "rate", *_MEANS, "skipped", "steps_per_s", "data_share")
 _VALIDATION = tuple(Validation.__dataclass_fields__)
 
 
 class Record:
     """Sums between two lines of the log, and the files of the run.
 
-    Only the first process ``writes``; ``total`` adds up a tensor over all processes.
+    Only the first process ``writes``; ``total`` adds up a tensor over all processes; ``losses`` names the parts of the
+    network's loss.
     """
 
     def __init__(
         self,
         out: Path,
         progress: Progress,
-        val: Sequence[PairSource],
+        val: Sequence[OpenedSource],
         reporter: Reporter,
         *,
         writes: bool,
         log_every: int,
+        losses: Sequence[str],
         total: Callable[[Tensor], Tensor] | None = None,
     ) -> None:
         self.out, self.progress, self.val = out, progress, val
         self.reporter, self.writes, self.log_every = reporter, writes, log_every
         self._total = total
-        self.curve = CurveFile(out / "log.csv", _COLUMNS)
+        self._means = ("loss", *losses, "hits", "pir", "ir", "norm")
+        columns = ("phase", "step", "rate", *self._means, "skipped", "steps_per_s", "data_share")
+        self.curve = CurveFile(out / "log.csv", columns)
         self.validations = CurveFile(out / "validation.csv", ("phase", *_VALIDATION))
         if writes:
             self.curve.begin(progress.total)
@@ -71,7 +75,7 @@ class Record:
         yield
         self._data_seconds += time.monotonic() - start
 
-    def outcome(self, network: RegistrationNetwork, outcome: Outcome, sample: Sample) -> None:
+    def outcome(self, network: Pretrained, outcome: Outcome, sample: Sample | Example) -> None:
         """Add a sample's losses; where a line of the log is due, its matches are looked at too."""
         self._add("loss", float(outcome.total.detach()))
         for name, loss in outcome.parts.items():
@@ -79,6 +83,8 @@ class Record:
         if outcome.hits is not None:
             self._add("hits", float(outcome.hits))
         if outcome.matched is not None and (self.progress.step + 1) % self.log_every == 0:
+            assert isinstance(network, RegistrationNetwork)
+            assert isinstance(sample, Sample)
             for name, value in _ratios(network, outcome, sample).items():
                 self._add(name, value)
 
@@ -113,14 +119,14 @@ class Record:
             return
         window = self.progress.window
         sums = self._total(
-            torch.tensor([window.get(name, [0.0, 0.0]) for name in _MEANS], dtype=torch.float64)
+            torch.tensor([window.get(name, [0.0, 0.0]) for name in self._means], dtype=torch.float64)
         )
         window.clear()
         if self.writes:
-            found = zip(_MEANS, sums.tolist(), strict=True)
+            found = zip(self._means, sums.tolist(), strict=True)
             window.update({name: [total, count] for name, (total, count) in found if count})
 
-    def validate(self, network: RegistrationNetwork, phase: Phase, device: torch.device) -> None:
+    def validate(self, network: Pretrained, phase: Phase, device: torch.device) -> None:
         """Measure the network, keep it as ``last/``, and as ``best/`` where it is."""
         start = time.monotonic()
         matcher = phase.losses.matcher

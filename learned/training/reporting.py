@@ -16,7 +16,8 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from hybridreg.learned.training.validation import Validation
 
 Row = Mapping[str, Any]
-_SHOWN = ("loss", "infonce", "coarse", "fine", "mask", "hits", "pir", "ir", "rate", "steps_per_s")
+# Columns of a line that are for the file alone, and those that come last.
+_HIDDEN, _LAST = ("total", "phase", "step", "skipped", "data_share", "norm"), ("rate", "steps_per_s")
 
 
 class Reporter:
@@ -62,7 +63,8 @@ class Reporter:
 
     def line(self, row: Row) -> None:
         """A line of the log."""
-        figures = " ".join(f"{name} {row[name]:.4g}" for name in _SHOWN if _told(row.get(name)))
+        shown = (*(name for name in row if name not in (*_HIDDEN, *_LAST)), *_LAST)
+        figures = " ".join(f"{name} {row[name]:.4g}" for name in shown if _told(row.get(name)))
         self.bar.update(self._task, figures=figures)
         if not self.terminal:
             self.console.print(f"{row['phase']} {row['step']}: {figures}", highlight=False, soft_wrap=True)

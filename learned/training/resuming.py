@@ -9,7 +9,7 @@ from typing import Any
 
 _log = logging.getLogger(__name__)
 
-_SHAPING = ("network", "seed", "start", "augmentation", "infonce", "clip", "precision")
+_SHAPING = ("kind", "network", "seed", "start", "augmentation", "infonce", "clip", "precision")
 
 
 def check_same(now: Mapping[str, Any], then: Mapping[str, Any], phase: int) -> None:
@@ -20,7 +20,7 @@ def check_same(now: Mapping[str, Any], then: Mapping[str, Any], phase: int) -> N
     ValueError
         Something that shaped the run is another: it is named.
     """
-    pairs = {name: (now[name], then[name]) for name in _SHAPING}
+    pairs = {name: (now.get(name), then.get(name, now.get(name))) for name in _SHAPING}
     pairs["data.train"] = (now["data"]["train"], then["data"]["train"])
     pairs[f"phase[:{phase + 1}]"] = (now["phase"][: phase + 1], then["phase"][: phase + 1])
     different = [name for name, (a, b) in pairs.items() if a != b]

@@ -14,12 +14,15 @@ from typing import TYPE_CHECKING, Any
 import torch
 
 from hybridreg.io.lock import folder_lock
+from hybridreg.learned.network_table import DEFAULT
 from hybridreg.learned.training import checkpoint
 from hybridreg.learned.training.card import make_card, write_card
 from hybridreg.learned.training.checkpoint import Progress
 from hybridreg.learned.training.data_choice import require_data
+from hybridreg.learned.training.examples import open_examples
 from hybridreg.learned.training.loop import CHECKPOINT, Loop, count_parameters
-from hybridreg.learned.training.pair_source import PairSource, open_source
+from hybridreg.learned.training.opened_source import OpenedSource
+from hybridreg.learned.training.pair_source import open_source
 from hybridreg.learned.training.preparing import prepare_all
 from hybridreg.learned.training.processes import start_processes
 from hybridreg.learned.training.recipe import Recipe, Source
@@ -104,6 +107,7 @@ def _train(
             reporter,
             writes=not quiet,
             log_every=recipe.log_every,
+            losses=network.loss_names,
             total=partial(_total, fabric) if fabric.world_size > 1 else None,
         )
         # While pairs are being prepared a signal ends the process at once: what is prepared lies on the disk.
@@ -132,10 +136,10 @@ def _before(recipe: Recipe, options: RunOptions) -> dict[str, Any]:
 
 def _sources(
     recipe: Recipe, wanted: Sequence[Source], options: RunOptions, fabric: Fabric, reporter: Reporter
-) -> list[PairSource]:
-    opened = []
+) -> list[OpenedSource]:
+    opened: list[OpenedSource] = []
     for source in wanted:
-        found = open_source(source, recipe, options.cache, told=fabric.is_global_zero)
+        found = _opened(source, recipe, options.cache, told=fabric.is_global_zero)
         found = replace(found, fingerprints=fabric.broadcast(found.fingerprints))
         if fabric.is_global_zero:
             reporter.begin(f"preparing {found.title}", len(found))
@@ -143,6 +147,10 @@ def _sources(
         usable = fabric.broadcast(found.usable)
         opened.append(found.only(usable))
     return opened
+
+
+def _opened(source: Source, recipe: Recipe, cache: Path, *, told: bool) -> OpenedSource:
+    return (open_source if recipe.kind == DEFAULT else open_examples)(source, recipe, cache, told=told)
 
 
 def _total(fabric: Fabric, values: torch.Tensor) -> torch.Tensor:

@@ -9,7 +9,7 @@ import warnings
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import torch
@@ -27,10 +27,13 @@ from hybridreg.learned.training.augmentation import (
     move_truth,
     relight,
 )
+from hybridreg.learned.training.opened_source import OpenedSource
 from hybridreg.learned.training.order import Order
-from hybridreg.learned.training.pair_source import PairSource
 from hybridreg.learned.training.prepared import PreparedPair
 from hybridreg.workers import end_with
+
+if TYPE_CHECKING:
+    from hybridreg.learned.training.examples import Example
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -67,7 +70,7 @@ class PhaseSamples(Dataset[Any]):
     """All samples of a phase by number; each has a random generator of its own, so that order does not matter."""
 
     def __init__(
-        self, sources: Sequence[PairSource], order: Order, augmentation: Augmentation, seed: Sequence[int]
+        self, sources: Sequence[OpenedSource], order: Order, augmentation: Augmentation, seed: Sequence[int]
     ) -> None:
         self.sources, self.order = tuple(sources), order
         self.augmentation, self.seed = augmentation, tuple(seed)
@@ -75,18 +78,17 @@ class PhaseSamples(Dataset[Any]):
     def __len__(self) -> int:
         return len(self.order)
 
-    def __getitem__(self, number: int) -> Sample | Unusable:
+    def __getitem__(self, number: int) -> Sample | Example | Unusable:
         source, pair = self.order[number]
         rng = np.random.default_rng([*self.seed, 2, number])
         try:
-            scale = self.augmentation.draw_scale(rng)
-            prepared = self.sources[source].load(pair, scale)
+            made: Sample | Example = self.sources[source].sample(pair, number, self.augmentation, rng)
         except Exception as error:  # a bad pair is a skipped step, named in the log
             name = self.id_of(number)
             return Unusable(
                 number=number, id=name, problem=" ".join(f"{type(error).__name__}: {error}".split())
             )
-        return augment(prepared, number, self.augmentation, self.sources[source].config.image, rng)
+        return made
 
     def id_of(self, number: int) -> str:
         """Name of the pair that a sample shows."""
@@ -118,7 +120,9 @@ def undisturbed(pair: PreparedPair, image: ImageConfig | None) -> Sample:
     return augment(pair, 0, still, image, np.random.default_rng(0))
 
 
-def stream(samples: PhaseSamples, numbers: Iterable[int], loaders: int) -> Iterator[Sample | Unusable]:
+def stream(
+    samples: PhaseSamples, numbers: Iterable[int], loaders: int
+) -> Iterator[Sample | Example | Unusable]:
     """The samples of those numbers, in order; read ahead by ``loaders`` processes.
 
     They come through pipes, as bytes: torch's own way goes through /dev/shm, and where that is small, as in a
@@ -156,5 +160,8 @@ def _as_it_is(sample: Any) -> Any:
 
 
 def _begin(leader: int, _: int) -> None:
+    # A forked process that asks GNU's OpenMP for threads waits for ever for those that its parent had: so not even the
+    # libraries that read the variable (`hybridreg.resources.n_threads`) may ask for two.
+    os.environ["OMP_NUM_THREADS"] = "1"
     torch.set_num_threads(1)
     end_with(leader)

@@ -8,7 +8,7 @@ import math
 import torch
 from torch import nn
 
-from hybridreg.learned.network import RegistrationNetwork
+from hybridreg.learned.pretrained import Pretrained
 from hybridreg.learned.training.recipe import Phase
 
 
@@ -29,15 +29,26 @@ def rate_at(phase: Phase, step: int, steps: int) -> float:
     return phase.rate
 
 
-def make_optimizer(phase: Phase, network: RegistrationNetwork) -> torch.optim.Optimizer:
-    """The phase's optimiser: the backbone's parameters with a factor on their rate, or frozen at factor 0."""
-    backbone = list(network.backbone.parameters())
+def make_optimizer(phase: Phase, network: Pretrained) -> torch.optim.Optimizer:
+    """The phase's optimiser: the backbone's parameters with a factor on their rate, or frozen at factor 0.
+
+    Raises
+    ------
+    ValueError
+        A factor for the backbone of a network that has none.
+    """
+    part = getattr(network, "backbone", None)
+    if part is None and phase.backbone_rate != 1.0:
+        raise ValueError(
+            f"phase {phase.name!r}: backbone_rate={phase.backbone_rate}, but {network.name} has no backbone"
+        )
+    backbone = [] if part is None else list(part.parameters())
     known = {id(parameter) for parameter in backbone}
     others = [parameter for parameter in network.parameters() if id(parameter) not in known]
     for parameter in backbone:
         parameter.requires_grad_(phase.backbone_rate > 0)
     groups = [{"params": others, "factor": 1.0}]
-    if phase.backbone_rate > 0:
+    if backbone and phase.backbone_rate > 0:
         groups.append({"params": backbone, "factor": phase.backbone_rate})
     make = torch.optim.AdamW if phase.optimizer == "adamw" else torch.optim.Adam
     # One pass over each tensor: a fifth of the time of the plain loop on the CPU.

@@ -7,14 +7,15 @@ import logging
 
 import torch
 
-from hybridreg.learned.network import RegistrationNetwork
+from hybridreg.learned.network_table import network_class
+from hybridreg.learned.pretrained import Pretrained
 from hybridreg.learned.training.recipe import Recipe
 from hybridreg.learned.weights import from_pretrained
 
 _log = logging.getLogger(__name__)
 
 
-def first_network(recipe: Recipe) -> RegistrationNetwork:
+def first_network(recipe: Recipe) -> Pretrained:
     """A network in training mode, its weights fixed by the recipe's seed.
 
     Raises
@@ -24,13 +25,13 @@ def first_network(recipe: Recipe) -> RegistrationNetwork:
     """
     with torch.random.fork_rng(devices=[]):
         torch.default_generator.manual_seed(recipe.seed)
-        network = RegistrationNetwork(recipe.network, recipe.seed)
+        network = network_class(recipe.kind).seeded(recipe.network, recipe.seed)
     if recipe.start:
         _take_over(network, recipe.start)
     return network.train()
 
 
-def _take_over(network: RegistrationNetwork, start: str) -> None:
+def _take_over(network: Pretrained, start: str) -> None:
     own, found = network.state_dict(), from_pretrained(start).state_dict()
     shared = {name: tensor for name, tensor in found.items() if name in own}
     wrong = [name for name, tensor in shared.items() if tensor.shape != own[name].shape]

@@ -17,11 +17,14 @@ from hybridreg.eval.row import Row, matrix
 from hybridreg.eval.scoring import score
 from hybridreg.learned.lgr import local_to_global
 from hybridreg.learned.network import RegistrationNetwork
+from hybridreg.learned.pretrained import Pretrained
 from hybridreg.learned.superpoint_matching import SuperpointMatches
 from hybridreg.learned.targets import Targets
 from hybridreg.learned.training.objective import fine_features
+from hybridreg.learned.training.opened_source import OpenedSource
 from hybridreg.learned.training.pair_source import PairSource
 from hybridreg.learned.training.samples import Sample, undisturbed
+from hybridreg.learned.training.stage_validation import rows_of
 
 PROTOCOL = protocol("cross3dreg")
 
@@ -48,11 +51,20 @@ class Validation:
     mask_f1: float
 
 
+def validate(network: Pretrained, source: OpenedSource, *, matcher: bool, device: torch.device) -> Validation:
+    """Figures of a network on one source; ``matcher`` false looks at the fine features alone."""
+    if isinstance(source, PairSource):
+        assert isinstance(network, RegistrationNetwork)
+        return _validate_prepared(network, source, matcher=matcher, device=device)
+    pairs = [(source.ids[index], source.pairs[index]) for index in source.usable]
+    rows = rows_of(network, pairs, device, PROTOCOL)
+    return _figures(source.title, rows, [], [], matcher=True)
+
+
 @torch.inference_mode()
-def validate(
+def _validate_prepared(
     network: RegistrationNetwork, source: PairSource, *, matcher: bool, device: torch.device
 ) -> Validation:
-    """Figures of a network on one source; ``matcher`` false looks at the fine features alone."""
     network.eval()
     rows, pirs, masks = [], [], []
     for number in range(len(source)):
@@ -65,9 +77,15 @@ def validate(
             row = _described(network, sample, number)
         rows.append(row)
     network.train()
+    return _figures(source.title, rows, pirs, masks, matcher=matcher)
+
+
+def _figures(
+    title: str, rows: Sequence[Row], pirs: Sequence[float], masks: Sequence[float], *, matcher: bool
+) -> Validation:
     result = score(rows, PROTOCOL)
     return Validation(
-        title=source.title,
+        title=title,
         pairs=len(rows),
         recall=result.recall if matcher else float("nan"),
         rre_deg=result.rre_deg_median if matcher else float("nan"),
@@ -79,9 +97,16 @@ def validate(
 
 
 def rank(found: Sequence[Validation], matcher: bool) -> tuple[float, ...]:
-    """What makes one validation better than another: recall, then inlier ratio; any matcher beats a warm-up."""
+    """What makes one validation better than another: recall, then inlier ratio; any matcher beats a warm-up.
+
+    Of a network without matches the smaller turn's error is the better.
+    """
     recall = _mean([each.recall for each in found]) if matcher else 0.0
-    return (float(matcher), round(recall, 9), _mean([each.inlier_ratio for each in found]))
+    ratio = _mean([each.inlier_ratio for each in found])
+    if np.isnan(ratio):
+        error = _mean([each.rre_deg for each in found])
+        ratio = -180.0 if np.isnan(error) else -error
+    return (float(matcher), round(recall, 9), ratio)
 
 
 def pair_inlier_ratio(superpoints: SuperpointMatches, targets: Targets) -> float:

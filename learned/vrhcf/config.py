@@ -156,7 +156,7 @@ def _nano() -> SphereNetConfig:
 SIZES: dict[str, Callable[[], SphereNetConfig]] = {
     "nano": _nano,
     "small": _small,
-    "3dmatch": SphereNetConfig,
+    "vrhcf-3dmatch": SphereNetConfig,
 }
 
 
@@ -166,7 +166,7 @@ def named_config(name: str) -> SphereNetConfig:
     Parameters
     ----------
     name
-        ``nano``, ``small`` (outdoor, ours, everything right) or ``3dmatch`` (as released: 2.24 M parameters).
+        ``nano``, ``small`` (outdoor, ours, everything right) or ``vrhcf-3dmatch`` (as released: 2.24 M parameters).
 
     Raises
     ------
@@ -174,5 +174,5 @@ def named_config(name: str) -> SphereNetConfig:
         An unknown name; the message lists the known ones.
     """
     if name not in SIZES:
-        raise KeyError(f"SphereNet: unknown size {name!r}; known are {', '.join(SIZES)}")
+        raise KeyError(f"unknown size {name!r} of SphereNet; known are {', '.join(SIZES)}")
     return SIZES[name]()

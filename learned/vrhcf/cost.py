@@ -3,10 +3,10 @@
 
 from __future__ import annotations
 
+from hybridreg.learned.memory import SLACK
 from hybridreg.learned.vrhcf.config import SphereNetConfig
 
 _FLOAT = 4
-_SLACK = 2**26  # what the heap holds beside what is in use
 # Patches that go through the network together: more of them are no faster on a CPU.
 CHUNK = 16
 # Of the largest layer: input padded twice, unfolded by the convolution, output and norm.
@@ -39,5 +39,5 @@ def forward_bytes(config: SphereNetConfig, keypoints: int) -> int:
     # Eight cells of every point: index (int64), weight, and the parts of both.
     spread = config.patch_points * 8 * 40
     return (
-        _SLACK + chunk * (largest * cells * _FLOAT * _COPIES + spread) + keypoints * config.width * _FLOAT * 2
+        SLACK + chunk * (largest * cells * _FLOAT * _COPIES + spread) + keypoints * config.width * _FLOAT * 2
     )

@@ -1,13 +1,27 @@
 # SPDX-License-Identifier: MIT
-"""A patch's reference axis, and the rotation that stands it upright."""
+"""A patch's reference axis, what it faces, and the rotation that stands it upright."""
 
 from __future__ import annotations
 
 from typing import Literal
 
+import numpy as np
 import torch
+from numpy.typing import NDArray
 from torch import Tensor
 from torch.nn import functional as F
+
+from hybridreg.scene import Level, centre
+
+# Metres over the middle of a cloud that nobody knows the place of: axes that face it look upwards.
+_ABOVE = 100.0
+
+
+def place(level: Level, facing: Literal["origin", "sensor"]) -> NDArray[np.float64]:
+    """Where (3,) the axes of a cloud's patches face, metres in its frame (`SphereNetConfig.facing`)."""
+    if facing == "origin":
+        return np.zeros(3)
+    return centre(level) if level.viewpoint is not None else centre(level) + [0.0, 0.0, _ABOVE]
 
 
 def reference_axes(patches: Tensor, keypoints: Tensor) -> Tensor:

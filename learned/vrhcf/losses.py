@@ -27,6 +27,16 @@ class SphereLosses:
     total: Tensor
     accuracy: Tensor  # in [0, 1]
 
+    @property
+    def parts(self) -> dict[str, Tensor]:
+        """Before they are weighed, for the log."""
+        return {"hardest": self.total}
+
+    @property
+    def hits(self) -> Tensor:
+        """The accuracy."""
+        return self.accuracy
+
 
 def losses(config: SphereNetConfig, output: SphereOutput, targets: SphereTargets) -> SphereLosses:
     """Loss of an output on the keypoint pairs of a step, on unit descriptors: the source's are the anchors."""

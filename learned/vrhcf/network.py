@@ -12,15 +12,18 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional as F
 
-from hybridreg.learned.own_network import OwnNetwork, load_by_names, read_state
+from hybridreg.learned.checkpoints import read_checkpoint
+from hybridreg.learned.pretrained import Pretrained
 from hybridreg.learned.vrhcf.batch import SphereBatch
-from hybridreg.learned.vrhcf.config import ShellConv, SphereNetConfig, SurfaceConv, named_config
+from hybridreg.learned.vrhcf.config import SIZES, ShellConv, SphereNetConfig, SurfaceConv, named_config
 from hybridreg.learned.vrhcf.cost import CHUNK, forward_bytes
+from hybridreg.learned.vrhcf.examples import example
 from hybridreg.learned.vrhcf.frames import reference_axes, upright_rotations
 from hybridreg.learned.vrhcf.losses import SphereLosses, losses
 from hybridreg.learned.vrhcf.official_names import UNUSED, official_names
 from hybridreg.learned.vrhcf.targets import SphereTargets
 from hybridreg.learned.vrhcf.voxels import counts, spherical, voxels
+from hybridreg.learned.weights import load_official_tensors
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -77,7 +80,7 @@ def pad_sphere(x: Tensor, reach: int, *, wraps_azimuth: bool) -> Tensor:
     return F.pad(x, (before, after) if flat == -1 else (0, 0, before, after))
 
 
-class SphereNet(OwnNetwork):
+class SphereNet(Pretrained):
     """The descriptor (ThreeDMatch/model.py). No part of it takes a ground truth.
 
     Parameters
@@ -87,7 +90,14 @@ class SphereNet(OwnNetwork):
         the released behaviour differs from the right one.
     """
 
-    kind: ClassVar[str] = "vrhcf"
+    name: ClassVar[str] = "vrhcf"
+    config_type: ClassVar[type] = SphereNetConfig
+    sizes: ClassVar[tuple[str, ...]] = tuple(SIZES)
+    loss_names: ClassVar[tuple[str, ...]] = ("hardest",)
+    named_config = staticmethod(named_config)
+    example = staticmethod(example)
+    # All keypoints of a cloud would take longer than the steps between two validations.
+    validated_with: ClassVar[Mapping[str, Any]] = {"max_keypoints": 500}
 
     def __init__(self, config: SphereNetConfig) -> None:
         super().__init__()
@@ -101,16 +111,6 @@ class SphereNet(OwnNetwork):
         )
 
     @classmethod
-    def build(cls, values: Mapping[str, Any]) -> SphereNet:
-        """A network of random weights from a configuration's plain values."""
-        return cls(SphereNetConfig.from_dict(values))
-
-    @classmethod
-    def named(cls, size: str) -> SphereNet:
-        """A network of random weights: ``nano``, ``small`` or ``3dmatch``."""
-        return cls(named_config(size))
-
-    @classmethod
     def load_official(
         cls, path: str | os.PathLike[str], size: SphereNetConfig | str | None = None
     ) -> SphereNet:
@@ -121,8 +121,8 @@ class SphereNet(OwnNetwork):
         path
             A file of ``torch.save`` that holds a state dict, its names with or without the wrapper's ``module.``.
         size
-            A configuration or its name; by default ``3dmatch``, with everything as released. Another ``padding`` than
-            "released" computes something else from these weights than they were trained for.
+            A configuration or its name; by default ``vrhcf-3dmatch``, with everything as released. Another ``padding``
+            than "released" computes something else from these weights than they were trained for.
 
         Raises
         ------
@@ -131,14 +131,11 @@ class SphereNet(OwnNetwork):
         ValueError
             Not a checkpoint of this network: the wrong tensor is named.
         """
-        tensors = read_state(path, "state_dict")
-        network = cls(named_config(size or "3dmatch") if size is None or isinstance(size, str) else size)
-        network.load_official_tensors(tensors, str(path))
+        tensors = read_checkpoint(path).tensors
+        size = size or "vrhcf-3dmatch"
+        network = cls(named_config(size) if isinstance(size, str) else size)
+        load_official_tensors(network, tensors, str(path), official_names(network).__getitem__, UNUSED)
         return network.eval()
-
-    def load_official_tensors(self, tensors: Mapping[str, Tensor], origin: str) -> None:
-        """Load tensors that bear the checkpoint's names, strictly; those that no computation reads must be there."""
-        load_by_names(self, tensors, official_names(self), UNUSED, origin)
 
     def untrained(self) -> frozenset[str]:
         """Its norms have no parameters: the statistics that they keep tell whether any batch came by."""

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, ClassVar, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from hybridreg.learned.stages.own_network_stage import OwnNetworkStage, on_grid
+from hybridreg.learned.stages.network_grid import on_grid
+from hybridreg.learned.stages.network_stage import NetworkStage
 from hybridreg.matches import Correspondences, Overlap
 from hybridreg.scene import Level, Scene
 
@@ -23,14 +24,12 @@ Rows = NDArray[np.int64]
 
 # Multiply-adds of both clouds together that a stage may take unasked: a minute or so of one CPU core, and of a GPU.
 _CPU_BUDGET, _GPU_BUDGET = 1.5e12, 4e14
-# Metres over the middle of a cloud that nobody knows the place of: axes that face it look upwards.
-_ABOVE = 100.0
 # The published scripts describe at most so many keypoints of a cloud.
 _MOST, _FEWEST = 5_000, 100
 
 
 @dataclass(frozen=True, kw_only=True)
-class Vrhcf(OwnNetworkStage):
+class Vrhcf(NetworkStage):
     """Spherical descriptors of single keypoints, nearest partners in one direction (Zhao et al., ICME 2024).
 
     With the estimator "hcf" this is VRHCF. The published descriptor takes 2.9 G multiply-adds a keypoint, a thousand
@@ -55,7 +54,7 @@ class Vrhcf(OwnNetworkStage):
     matching: Literal["channels", "unit"] | None = None
     mutual: bool = False
 
-    NETWORK: ClassVar[str] = "hybridreg.learned.vrhcf.network:SphereNet"
+    kind: ClassVar[str] = "vrhcf"
     gives: ClassVar[frozenset[str]] = frozenset({"matches"})
     parts: ClassVar[frozenset[str]] = frozenset({"layers"})
 
@@ -73,11 +72,13 @@ class Vrhcf(OwnNetworkStage):
     def __call__(self, scene: Scene, overlap: Overlap) -> Correspondences:
         import torch
 
+        from hybridreg.learned.memory import require_bytes
         from hybridreg.learned.stages.arrays import array
         from hybridreg.learned.vrhcf.batch import make_batch
+        from hybridreg.learned.vrhcf.frames import place
         from hybridreg.learned.vrhcf.matching import match_descriptors
 
-        network: SphereNet = self.network()  # type: ignore[assignment]
+        network: SphereNet = self.network()
         self.note_random(scene)
         config = network.config
         clouds = on_grid(scene, config.voxel)
@@ -85,10 +86,11 @@ class Vrhcf(OwnNetworkStage):
         rows = [self._rows(points, *level) for points, level in zip(clouds, levels, strict=True)]
         rows = self._capped(scene, rows, config)
         # Axes face the origin: with the sensor there, they face the sensor.
-        seen_from = [_place(level, config.facing) for _, level in levels]
-        moved = [points - place for points, place in zip(clouds, seen_from, strict=True)]
+        seen_from = [place(level, config.facing) for _, level in levels]
+        moved = [points - at for points, at in zip(clouds, seen_from, strict=True)]
         batch = make_batch(moved[0], moved[1], config, keypoints=(rows[0], rows[1]), device=self.device)
-        _require_memory(network.memory(batch), [len(r) for r in rows], self.device)
+        described = (len(rows[0]), len(rows[1]))
+        require_bytes(network.memory(batch), described, self.device, "set max_keypoints to less")
         matching = self.matching or config.matching
         with torch.inference_mode():
             output = network(batch)
@@ -137,23 +139,3 @@ class Vrhcf(OwnNetworkStage):
             warnings.warn(f"VRHCF is about to describe {asked} keypoints: {cost}", UserWarning, stacklevel=3)
         rng = np.random.default_rng(0)
         return [np.sort(rng.choice(r, n, replace=False)) for r, n in zip(rows, counts, strict=True)]
-
-
-def _place(level: Level, facing: str) -> Array:
-    if facing == "origin":
-        return np.zeros(3)
-    if level.viewpoint is None:
-        above: Array = np.median(level.points, axis=0) + [0.0, 0.0, _ABOVE]
-        return above
-    return level.viewpoint if level.viewpoint.ndim == 1 else level.viewpoint.mean(axis=0)
-
-
-def _require_memory(needed: int, keypoints: list[int], device: str) -> None:
-    from hybridreg.learned.memory import available_bytes
-
-    free = available_bytes(device)
-    if free is not None and needed > free:
-        raise ValueError(
-            f"SphereNet would take about {needed / 1e9:.2g} GB for {keypoints[0]} target and {keypoints[1]} source "
-            f"keypoints, and {free / 1e9:.2g} GB are free: set max_keypoints to less"
-        )

@@ -22,6 +22,10 @@ class SphereTargets:
     target: Tensor  # (g,) int64 rows of the target's patches
     source: Tensor  # (g,) int64 rows of the source's patches
 
+    def to(self, device: torch.device | str) -> SphereTargets:
+        """The same targets on another device."""
+        return SphereTargets(target=self.target.to(device), source=self.source.to(device))
+
 
 def pair_keypoints(
     target: npt.NDArray[np.floating],

@@ -6,12 +6,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import torch
-from arrays import apart
+from arrays import Found, apart
 from cofinet_matching import assignments_apart
 from cofinet_training import named_parts
-from stacked import (
-    Found,
-)
 from torch import Tensor
 
 from hybridreg.learned.cofinet.config import CofinetConfig, SelectionConfig

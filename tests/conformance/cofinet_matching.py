@@ -8,11 +8,8 @@ from collections.abc import Mapping
 from typing import Any
 
 import torch
-from arrays import apart
-from stacked import (
-    FEATURES,
-    Found,
-)
+from arrays import Found, apart
+from stacked import FEATURES
 from torch import Tensor
 
 from hybridreg.learned.cofinet.attention import scores

@@ -7,14 +7,9 @@ from collections.abc import Mapping
 from typing import Any
 
 import torch
-from arrays import apart
+from arrays import Found, apart
 from cofinet_matching import patches_apart, recorded_patches, tied_matches
-from stacked import (
-    TIE,
-    Found,
-    gradients_apart,
-    norms_apart,
-)
+from stacked import TIE, gradients_apart, norms_apart
 from torch import Tensor
 
 from hybridreg.learned.batch import Batch

@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import torch
+from arrays import apart, unequal
 from plan import Recording
 from scipy.spatial import cKDTree
 from torch import Tensor
@@ -39,7 +40,7 @@ def differences(recording: Recording) -> dict[str, float]:
     want = recording.values
     blocks, output = _forward(recording)
     targets = compute_targets(recording.batch.pyramid, want["in.transform"], recording.config)
-    found = {f"out.{name}": _apart(value, want[f"out.{name}"]) for name, value in blocks.items()}
+    found = {f"out.{name}": apart(value, want[f"out.{name}"]) for name, value in blocks.items()}
     found |= _superpoints(recording, output)
     at_radius = pairs_at_radius(recording, targets)
     found |= _targets(targets, want, at_radius)
@@ -73,12 +74,6 @@ def _forward(recording: Recording) -> tuple[dict[str, Tensor], Output]:
     seen["src_geo_embedding_first32"] = embedding[:32, :32]
     seen["ref_feats_c"], seen["src_feats_c"] = output.node_features
     return seen, output
-
-
-def _apart(value: Tensor, want: Tensor) -> float:
-    if value.shape != want.shape:
-        return math.inf
-    return float((value.double() - want.double()).abs().max()) if value.numel() else 0.0
 
 
 def _superpoints(recording: Recording, output: Output) -> dict[str, float]:
@@ -176,10 +171,14 @@ def _transport(recording: Recording, output: Output) -> dict[str, float]:
     count = len(scores)
     nodes = want["out.ref_node_corr_indices"][:count], want["out.src_node_corr_indices"][:count]
     pairs = network.pair_up(output.encoding, *nodes)
-    same = torch.equal(pairs.target_mask, rows) and torch.equal(pairs.source_mask, columns)
+    masks = {"row": (pairs.target_mask, rows), "col": (pairs.source_mask, columns)}
+    found = {f"out.ot_{name}_masks_first4": unequal(*both) for name, both in masks.items()}
+    same = not any(found.values())
     own = network.assign(output.encoding, pairs) if same else expected * math.inf
-    return {
-        "out.ot_masks_first4": 0.0 if same else math.inf,
+    given = network.scores(output.encoding, pairs) if same else scores * math.inf
+    seen = rows[:, :, None] & columns[:, None]
+    return found | {
+        "out.ot_input_first4": apart(given[seen], scores[seen]),
         "out.matching_scores_first4": _assignments_apart(network.transport(scores, rows, columns), expected),
         "out.matching_scores_first4 (kernel)": _assignments_apart(
             network.transport(scores, rows, columns, "kernel"), expected
@@ -192,7 +191,7 @@ def _assignments_apart(value: Tensor, want: Tensor) -> float:
     padded = want < _PADDED
     if value.shape != want.shape or not torch.equal(value < _PADDED, padded):
         return math.inf
-    return _apart(value[~padded], want[~padded])
+    return apart(value[~padded], want[~padded])
 
 
 def _correspondences(recording: Recording, output: Output) -> dict[str, float]:
@@ -205,7 +204,7 @@ def _correspondences(recording: Recording, output: Output) -> dict[str, float]:
     )
     names = ("out.ref_corr_points", "out.src_corr_points", "out.corr_scores")
     return dict(zip(names, sets, strict=True)) | {
-        "out.estimated_transform": _apart(pose.transform, want["out.estimated_transform"])
+        "out.estimated_transform": apart(pose.transform, want["out.estimated_transform"])
     }
 
 
@@ -239,8 +238,8 @@ def _losses(recording: Recording, output: Output, targets: Targets) -> dict[str,
         config.loss.positive_radius,
     )
     return {
-        "out.loss_coarse": _apart(coarse, want["out.loss_coarse"]),
-        "out.loss_fine": _apart(fine, want["out.loss_fine"]),
+        "out.loss_coarse": apart(coarse, want["out.loss_coarse"]),
+        "out.loss_fine": apart(fine, want["out.loss_fine"]),
     }
 
 
@@ -261,5 +260,5 @@ def _lgr_alone(recording: Recording) -> dict[str, float]:
     sets = _rows_apart((target, source, probability[chosen]), (expected[0], expected[1], expected[2]))
     names = ("lgr.out.ref_corr_points", "lgr.out.src_corr_points", "lgr.out.corr_scores")
     return dict(zip(names, sets, strict=True)) | {
-        "lgr.out.transform": _apart(pose.transform, want["lgr.out.transform"])
+        "lgr.out.transform": apart(pose.transform, want["lgr.out.transform"])
     }

@@ -3,14 +3,13 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import torch
+from arrays import read_arrays, read_plan, read_weights
 from torch import Tensor
 
 from hybridreg.learned.batch import Batch
@@ -39,18 +38,11 @@ class Recording:
 
 def read_recording(stem: Path) -> Recording:
     """Read ``STEM.json``, ``STEM.npz`` and ``STEM_weights.npz`` and build the network from the JSON alone."""
-    plan = json.loads(stem.with_name(f"{stem.name}.json").read_text())
-    values = _read(stem.with_name(f"{stem.name}.npz"))
-    weights = _read(stem.with_name(f"{stem.name}_weights.npz"))
+    plan, values = read_plan(stem), read_arrays(stem.with_name(f"{stem.name}.npz"))
     config = network_config(plan)
     network = RegistrationNetwork(config)
-    load_official_tensors(network, {name.removeprefix("w."): t for name, t in weights.items()}, stem.name)
+    load_official_tensors(network, read_weights(stem), stem.name)
     return Recording(config, network.eval(), _batch(values, config.backbone.stages), values)
-
-
-def _read(path: Path) -> dict[str, Tensor]:
-    with np.load(path) as arrays:
-        return {name: torch.from_numpy(np.array(arrays[name])) for name in arrays.files}
 
 
 def network_config(plan: Mapping[str, Any]) -> NetworkConfig:

@@ -8,10 +8,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import torch
-from stacked import (
-    TIE,
-    Found,
-)
+from arrays import Found
+from stacked import TIE
 from torch import Tensor
 
 from hybridreg.learned.predator.config import PredatorLossConfig

@@ -8,14 +8,9 @@ from collections.abc import Mapping
 from typing import Any
 
 import torch
-from arrays import apart
+from arrays import Found, apart
 from predator_labels import Sides, drawn_apart, labels_apart, labels_unequal, tied_labels
-from stacked import (
-    FEATURES,
-    Found,
-    gradients_apart,
-    norms_apart,
-)
+from stacked import FEATURES, gradients_apart, norms_apart
 from torch import Tensor
 
 from hybridreg.learned.batch import Batch

@@ -7,19 +7,16 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import torch
-from arrays import apart, read_plan, read_weights
+from arrays import Found, apart, complete, held, read_arrays, read_plan, read_weights
 from cofinet_alone import losses_alone, transports
 from cofinet_matching import assignments_apart, matching, named_steps
 from cofinet_training import recorded_targets, training
 from stacked import (
+    FEATURES,
     EncoderOutputs,
-    Found,
     backbone_config,
-    complete,
     decoder_outputs,
-    held,
     read_batch,
     recorded_order,
 )
@@ -30,7 +27,7 @@ from hybridreg.learned.cofinet.attention import scores
 from hybridreg.learned.cofinet.config import CofinetConfig, CofinetLossConfig, SelectionConfig
 from hybridreg.learned.cofinet.network import CofinetEncoding, CofinetNetwork
 from hybridreg.learned.cofinet.official_names import UNUSED, official_name
-from hybridreg.learned.kpfcnn_names import load_stacked
+from hybridreg.learned.weights import load_official_tensors
 
 COARSE = 1e-3
 
@@ -38,11 +35,10 @@ COARSE = 1e-3
 def compare(stem: Path) -> Found:
     """Largest difference and tolerance by recorded output."""
     plan = read_plan(stem)
-    with np.load(stem.with_name(f"{stem.name}.npz")) as arrays:
-        want = {name: torch.from_numpy(np.array(arrays[name])) for name in arrays.files}
+    want = read_arrays(stem.with_name(f"{stem.name}.npz"))
     config = network_config(plan)
     network = CofinetNetwork(config)
-    load_stacked(network, read_weights(stem), stem.name, official_name, UNUSED)
+    load_official_tensors(network, read_weights(stem), stem.name, official_name, UNUSED)
     batch = read_batch(want, config.backbone.stages)
     with torch.no_grad():
         encoding, found = _forward(network.eval(), batch, want)
@@ -55,8 +51,8 @@ def compare(stem: Path) -> Found:
         found[key] = (apart(encoding.log_assignment, want[key]), COARSE)
     found |= training(network, batch, targets, want, plan)
     found |= transports(config, want) | losses_alone(config, want)
-    inputs = ("in.", "ot.coarse.in", "ot.coarse.bin_score", "ot.fine.in", "ot.fine.node_conf", "synth.gt_")
-    return complete(found, want, inputs)
+    inputs = ("in.", "ot.coarse.in", "ot.coarse.bin_score", "ot.fine.in", "ot.fine.node_conf")
+    return complete(found, want, [*inputs, *(name for name in want if name.startswith("synth.gt_"))])
 
 
 def network_config(plan: Mapping[str, Any]) -> CofinetConfig:
@@ -117,7 +113,7 @@ def _forward(
     seen |= decoder_outputs(network.decoder, torch.cat([projected[1], projected[0]]), skips, pyramid)
     encoding = network.encode(batch)
     seen["feats"] = torch.cat([encoding.source.point_features, encoding.target.point_features])
-    found = held(seen, want, "out.")
+    found = held(seen, want, "out.", FEATURES)
     found["out.coarse_scores"] = (apart(scores(projected), want["out.coarse_scores"]), COARSE)
     found["out.coarse_log_assignment"] = (
         apart(encoding.log_assignment, want["out.coarse_log_assignment"]),

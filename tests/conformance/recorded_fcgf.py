@@ -11,7 +11,18 @@ from typing import Any
 
 import numpy as np
 import torch
-from arrays import apart, complete, gradients, held, read_plan, read_values, read_weights, statistics, unequal
+from arrays import (
+    Found,
+    apart,
+    complete,
+    gradients,
+    held,
+    read_plan,
+    read_values,
+    read_weights,
+    statistics,
+    unequal,
+)
 from torch import Tensor
 
 from hybridreg.learned.fcgf.batch import FcgfBatch, VoxelClouds, make_batch
@@ -26,7 +37,6 @@ from hybridreg.learned.layers.voxels import VoxelPyramid, quantise
 from hybridreg.learned.procrustes import apply_transform
 from hybridreg.learned.weights import load_official_tensors
 
-Found = dict[str, tuple[float, float]]
 FORWARD, TIE = 1e-4, 1e-5
 
 

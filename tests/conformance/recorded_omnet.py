@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 import torch
-from arrays import apart, complete, gradients, held, read_plan, read_values, read_weights, statistics
+from arrays import Found, apart, complete, gradients, held, read_plan, read_values, read_weights, statistics
 from torch import Tensor
 
 from hybridreg.learned.omnet.batch import OmnetBatch
@@ -29,7 +29,6 @@ from hybridreg.learned.omnet.quaternions import compose, matrix_of, multiply, po
 from hybridreg.learned.omnet.targets import OmnetTargets, compute_targets
 from hybridreg.learned.weights import load_official_tensors
 
-Found = dict[str, tuple[float, float]]
 FORWARD, TRAINED_LOGITS, TIE = 1e-4, 1e-3, 1e-4
 _LOSSES = {"mask": "cls", "quaternion": "quat", "translation": "translate"}
 # Along which axis a recording has the first points alone.

@@ -8,28 +8,25 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import torch
-from arrays import apart, read_plan, read_weights
+from arrays import Found, apart, complete, held, read_arrays, read_plan, read_weights
 from predator_training import losses_alone, losses_on_recording, training
 from stacked import (
+    FEATURES,
     EncoderOutputs,
-    Found,
     backbone_config,
-    complete,
     decoder_outputs,
-    held,
     read_batch,
     recorded_order,
 )
 from torch import Tensor
 
 from hybridreg.learned.batch import Batch
-from hybridreg.learned.kpfcnn_names import load_stacked
 from hybridreg.learned.predator.config import GraphConfig, PredatorConfig, PredatorLossConfig
 from hybridreg.learned.predator.graph import nearest_others
 from hybridreg.learned.predator.network import PredatorNetwork
 from hybridreg.learned.predator.official_names import official_name
+from hybridreg.learned.weights import load_official_tensors
 
 # Metres: the expanded square's rounding at the clouds' distance from the origin.
 _KNN_TIE = 1e-3
@@ -38,14 +35,15 @@ _KNN_TIE = 1e-3
 def compare(stem: Path) -> Found:
     """Largest difference and tolerance by recorded output."""
     plan = read_plan(stem)
-    with np.load(stem.with_name(f"{stem.name}.npz")) as arrays:
-        want = {name: torch.from_numpy(np.array(arrays[name])) for name in arrays.files}
+    want = read_arrays(stem.with_name(f"{stem.name}.npz"))
     config = network_config(plan)
     network = PredatorNetwork(config)
-    load_stacked(network, read_weights(stem), stem.name, official_name)
+    load_official_tensors(network, read_weights(stem), stem.name, official_name)
     batch = read_batch(want, config.backbone.stages)
     with torch.no_grad():
-        found = held(block_outputs(network.eval(), batch), want, "out.") | _neighbors(batch, config, want)
+        found = held(block_outputs(network.eval(), batch), want, "out.", FEATURES) | _neighbors(
+            batch, config, want
+        )
         found |= losses_on_recording(network, batch, want, "loss.")
     found |= training(network, batch, want, plan)
     found |= losses_alone(want, config.loss)

@@ -5,12 +5,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import numpy as np
 import torch
-from apart import Found
+from arrays import complete
 from roitr_geometry import compare_geometry
 from roitr_matching import compare_matching, compare_training
 from roitr_plan import SIDES, RoitrRecording, read_recording
+from ties import Compared
 from torch import Tensor
 from torch.nn import functional as F
 
@@ -26,7 +26,7 @@ MODULE, CHAIN = 1e-4, 2e-3
 def compare(stem: Path) -> dict[str, tuple[float, float]]:
     """Largest difference and tolerance by output."""
     recording = read_recording(stem)
-    found = Found()
+    found = Compared()
     compare_geometry(recording, found)
     with torch.no_grad():
         for side in SIDES:
@@ -35,11 +35,8 @@ def compare(stem: Path) -> dict[str, tuple[float, float]]:
         _transformer(recording, found)
         compare_matching(recording, found)
     compare_training(recording, found)
-    for name, count in found.ties.items():
-        print(f"{name}: {count} ties forgiven")
-    missing = [name for name in recording.values if name not in found.values and not _is_input(name)]
-    found.values |= {f"{name} (not compared)": (np.inf, 0.0) for name in missing}
-    return found.values
+    found.print_ties()
+    return complete(found.values, recording.values, [name for name in recording.values if _is_input(name)])
 
 
 def _is_input(name: str) -> bool:
@@ -47,7 +44,7 @@ def _is_input(name: str) -> bool:
     return name.startswith("train.in.") or (name.startswith("in.") and name.count(".") == 1)
 
 
-def _backbone_chain(recording: RoitrRecording, side: str, found: Found) -> None:
+def _backbone_chain(recording: RoitrRecording, side: str, found: Compared) -> None:
     backbone, levels = recording.network.backbone, recording.levels(side)
     ppf = LevelFeatures.of(levels)
     encoded = backbone.encode(levels, ppf)
@@ -71,7 +68,7 @@ def _backbone_chain(recording: RoitrRecording, side: str, found: Found) -> None:
     )
 
 
-def _backbone_modules(recording: RoitrRecording, side: str, found: Found) -> None:
+def _backbone_modules(recording: RoitrRecording, side: str, found: Compared) -> None:
     backbone, levels, values = recording.network.backbone, recording.levels(side), recording.values
     ppf = LevelFeatures.of(levels)
     count = len(levels.points)
@@ -98,7 +95,7 @@ def _backbone_modules(recording: RoitrRecording, side: str, found: Found) -> Non
     _cut(found, recording, _first(recording, f"out.{side}_point_feats_first"), fine, " (module)", MODULE)
 
 
-def _transformer(recording: RoitrRecording, found: Found) -> None:
+def _transformer(recording: RoitrRecording, found: Compared) -> None:
     """The layers on the recorded coarsest features; each layer also on the recorded output of the one before."""
     network, values = recording.network, recording.values
     transformer = network.transformer
@@ -139,7 +136,7 @@ def _transformer(recording: RoitrRecording, found: Found) -> None:
         found.close(f"out.{side}_nodes", cloud.nodes, values[f"out.{side}_nodes"], 0.0)
 
 
-def _structure(recording: RoitrRecording, side: str, found: Found) -> Tensor:
+def _structure(recording: RoitrRecording, side: str, found: Compared) -> Tensor:
     embedding = recording.network.transformer.embedding
     points = recording.levels(side).points[-1]
     distance = squared_distances(points, points).sqrt()
@@ -189,7 +186,7 @@ def _first(recording: RoitrRecording, start: str, end: str = "") -> str:
 
 
 def _cut(
-    found: Found,
+    found: Compared,
     recording: RoitrRecording,
     name: str,
     value: Tensor,

@@ -4,8 +4,8 @@
 from __future__ import annotations
 
 import torch
-from apart import Found
 from roitr_plan import SIDES, RoitrRecording
+from ties import Compared
 from torch import Tensor
 
 from hybridreg.learned.distances import squared_distances
@@ -19,7 +19,7 @@ _TIE = 1e-5
 _SQUARE_TIE = 2e-4
 
 
-def compare_geometry(recording: RoitrRecording, found: Found) -> None:
+def compare_geometry(recording: RoitrRecording, found: Compared) -> None:
     """Levels built from the points alone, features and patches of the recorded levels."""
     values = recording.values
     for side in SIDES:
@@ -44,7 +44,7 @@ def compare_geometry(recording: RoitrRecording, found: Found) -> None:
         _patches(recording, side, found)
 
 
-def _levels(side: str, own: Levels, given: Levels, found: Found) -> None:
+def _levels(side: str, own: Levels, given: Levels, found: Compared) -> None:
     for level in range(1, len(given.points) + 1):
         if level > 1:
             found.same(f"in.{side}.fps.{level}", own.picked[level - 2], given.picked[level - 2])
@@ -78,7 +78,7 @@ def _levels(side: str, own: Levels, given: Levels, found: Found) -> None:
             )
 
 
-def _rows(name: str, own: Tensor, given: Tensor, queries: Tensor, supports: Tensor, found: Found) -> None:
+def _rows(name: str, own: Tensor, given: Tensor, queries: Tensor, supports: Tensor, found: Compared) -> None:
     if own.shape != given.shape:
         found.values[name] = (float("inf"), 0.0)
         return
@@ -86,7 +86,7 @@ def _rows(name: str, own: Tensor, given: Tensor, queries: Tensor, supports: Tens
     found.tied(name, own != given, (distances[0] - distances[1]).abs(), _TIE)
 
 
-def _patches(recording: RoitrRecording, side: str, found: Found) -> None:
+def _patches(recording: RoitrRecording, side: str, found: Compared) -> None:
     values, levels = recording.values, recording.levels(side)
     points, nodes = levels.points[0], levels.points[-1]
     patches = build_patches(points, nodes, recording.config.matching.patch_points)

@@ -4,8 +4,9 @@
 from __future__ import annotations
 
 import torch
-from apart import TIE, Found, apart, rows_apart
+from arrays import apart
 from roitr_plan import RoitrRecording
+from ties import TIE, Compared, rows_apart
 from torch import Tensor
 
 from hybridreg.learned.distances import squared_distances
@@ -25,7 +26,7 @@ _PADDED = -1e5
 _RADIUS_TIE = 1e-5  # metres
 
 
-def compare_matching(recording: RoitrRecording, found: Found) -> None:
+def compare_matching(recording: RoitrRecording, found: Compared) -> None:
     """Superpoint pairs, transport and point matches, on the recorded features where these are whole."""
     values, config = recording.values, recording.config
     target, source = recording.network.encode(recording.batch)
@@ -64,7 +65,7 @@ def compare_matching(recording: RoitrRecording, found: Found) -> None:
     found.close("out.IR", torch.tensor(ir), values["out.IR"], MODULE + 2.0 * lonely / max(1, len(matches)))
 
 
-def compare_training(recording: RoitrRecording, found: Found) -> None:
+def compare_training(recording: RoitrRecording, found: Compared) -> None:
     """Losses of the recorded training step, and gradients of the recorded parameters."""
     values, network = recording.values, recording.network
     network.train()
@@ -132,7 +133,7 @@ def _with_recorded(recording: RoitrRecording, cloud: CloudEncoding, side: str) -
 
 
 def _targets(
-    recording: RoitrRecording, target: CloudEncoding, source: CloudEncoding, found: Found
+    recording: RoitrRecording, target: CloudEncoding, source: CloudEncoding, found: Compared
 ) -> RoitrTargets:
     values, config = recording.values, recording.config
     targets = compute_targets(recording.batch, values["in.transform"], config)
@@ -157,7 +158,7 @@ def _targets(
     return targets
 
 
-def _shares(recording: RoitrRecording, target: CloudEncoding, source: CloudEncoding, found: Found) -> None:
+def _shares(recording: RoitrRecording, target: CloudEncoding, source: CloudEncoding, found: Compared) -> None:
     # A point whose nearest one lies at the radius may count or not: between both shares everything is right.
     clouds = (target.points, source.points), (target.patches, source.patches)
     low, own, high = (
@@ -187,7 +188,7 @@ def _radius_ties(target: CloudEncoding, source: CloudEncoding, transform: Tensor
 
 
 def _superpoints(
-    recording: RoitrRecording, target: CloudEncoding, source: CloudEncoding, found: Found
+    recording: RoitrRecording, target: CloudEncoding, source: CloudEncoding, found: Compared
 ) -> SuperpointMatches:
     values = recording.values
     own = recording.network.match_superpoints(target, source)
@@ -218,7 +219,9 @@ def _every_score(recording: RoitrRecording, target: CloudEncoding, source: Cloud
     return scores
 
 
-def _adaptive(recording: RoitrRecording, target: CloudEncoding, source: CloudEncoding, found: Found) -> None:
+def _adaptive(
+    recording: RoitrRecording, target: CloudEncoding, source: CloudEncoding, found: Compared
+) -> None:
     values, plan = recording.values, recording.plan["adaptive_matching"]
     rows = [cloud.patches.occupied.nonzero()[:, 0] for cloud in (target, source)]
     features = [cloud.node_features[index] for cloud, index in zip((target, source), rows, strict=True)]
@@ -242,7 +245,7 @@ def _transport(
     target: CloudEncoding,
     source: CloudEncoding,
     superpoints: SuperpointMatches,
-    found: Found,
+    found: Compared,
 ) -> None:
     values, network = recording.values, recording.network
     name = next(n for n in values if n.startswith("out.ot_input_first"))
@@ -264,7 +267,7 @@ def _transport(
         )
 
 
-def _assignments(name: str, own: Tensor, want: Tensor, found: Found, large: float) -> None:
+def _assignments(name: str, own: Tensor, want: Tensor, found: Compared, large: float) -> None:
     """Unmasked entries; float32 leaves 1e-6 of the largest score that was summed."""
     padded = want < _PADDED
     if own.shape != want.shape or not torch.equal(own < _PADDED, padded):

@@ -3,14 +3,12 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-import torch
+from arrays import read_arrays, read_plan, read_weights
 from torch import Tensor
 
 from hybridreg.learned.config import LossConfig, MatchingConfig, TransformerConfig
@@ -18,6 +16,8 @@ from hybridreg.learned.roitr.batch import RoitrBatch
 from hybridreg.learned.roitr.config import RoitrConfig
 from hybridreg.learned.roitr.levels import Levels
 from hybridreg.learned.roitr.network import RoitrNetwork
+from hybridreg.learned.roitr.official_names import official_name, unused_names
+from hybridreg.learned.weights import load_official_tensors
 
 SIDES = ("src", "tgt")
 
@@ -39,20 +39,13 @@ class RoitrRecording:
 
 def read_recording(stem: Path) -> RoitrRecording:
     """Read the three files and build the network from the JSON alone."""
-    plan = json.loads(stem.with_name(f"{stem.name}.json").read_text())
-    values, weights = (read_arrays(stem.with_name(f"{stem.name}{end}.npz")) for end in ("", "_weights"))
+    plan, values = read_plan(stem), read_arrays(stem.with_name(f"{stem.name}.npz"))
     config = network_config(plan)
     network = RoitrNetwork(config)
-    network.load_official_tensors({name.removeprefix("w."): t for name, t in weights.items()}, stem.name)
+    unused = unused_names(network.state_dict())
+    load_official_tensors(network, read_weights(stem), stem.name, official_name, unused)
     batch = RoitrBatch(source=_levels(values, "src", config), target=_levels(values, "tgt", config))
     return RoitrRecording(plan, config, network.eval(), batch, values)
-
-
-def read_arrays(path: Path) -> dict[str, Tensor]:
-    """Arrays of a file by name; integers as int64."""
-    with np.load(path) as arrays:
-        found = {name: torch.from_numpy(np.array(arrays[name])) for name in arrays.files}
-    return {name: t.long() if t.dtype in (torch.int16, torch.int32) else t for name, t in found.items()}
 
 
 def network_config(plan: Mapping[str, Any]) -> RoitrConfig:

@@ -4,12 +4,11 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Mapping
 from typing import Any
 
 import torch
-from arrays import apart
+from arrays import Found, apart
 from torch import Tensor, nn
 
 from hybridreg.learned.batch import Batch
@@ -17,7 +16,6 @@ from hybridreg.learned.kpfcnn import KpfcnnDecoder, KpfcnnEncoder
 from hybridreg.learned.kpfcnn_config import KpfcnnConfig
 from hybridreg.learned.pyramid import Pyramid
 
-Found = dict[str, tuple[float, float]]
 FEATURES, SHARE = 2e-4, 0.01
 # A gradient that is nothing but rounding (of a bias before a normalisation) is held against this instead of itself.
 _NO_GRADIENT = 1e-3
@@ -121,21 +119,6 @@ def decoder_outputs(
     return found
 
 
-def held(
-    ours: Mapping[str, Tensor], want: Mapping[str, Tensor], prefix: str, tolerance: float = FEATURES
-) -> Found:
-    """Our tensors, by the names that follow the prefix, against those that were recorded; ``_firstN`` takes N rows."""
-    found: Found = {}
-    for key, expected in want.items():
-        name, count = re.fullmatch(r"(.*?)(?:_first(\d+))?", key.removeprefix(prefix)).groups()  # type: ignore[union-attr]
-        if key.startswith(prefix) and name in ours:
-            value = ours[name] if count is None else ours[name][: int(count)]
-            found[key] = (apart(value.reshape(-1), expected.reshape(-1)), tolerance)
-            if value.squeeze().shape != expected.squeeze().shape:
-                found[key] = (math.inf, tolerance)
-    return found
-
-
 def share_apart(value: Tensor, want: Tensor) -> float:
     """Largest difference as a share of each recorded value, or of 1e-3 where that is smaller."""
     if value.numel() != want.numel():
@@ -178,9 +161,3 @@ def norms_apart(
     ours = {names[name]: parameter.grad for name, parameter in network.named_parameters()}
     norms = [0.0 if ours.get(name) is None else float(ours[name].double().norm()) for name in recorded]  # type: ignore[union-attr]
     return share_apart(torch.tensor(norms), want), SHARE
-
-
-def complete(found: Found, want: Mapping[str, Tensor], inputs: tuple[str, ...]) -> Found:
-    """With an infinite difference for every recorded output that nobody compared; ``inputs`` begin what is none."""
-    missed = {key for key in want if key not in found and not key.startswith(inputs)}
-    return {**found, **dict.fromkeys(sorted(missed), (math.inf, 0.0))}

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import torch
-from apart import Found
+from ties import Compared
 from torch import Tensor
 
 from hybridreg import se3
@@ -39,7 +39,7 @@ def stage_of(part: str, plan: dict[str, Any]) -> Hcf:
     )
 
 
-def compare_estimator(part: str, plan: dict[str, Any], values: dict[str, Tensor], found: Found) -> None:
+def compare_estimator(part: str, plan: dict[str, Any], values: dict[str, Tensor], found: Compared) -> None:
     """Every recorded output of one part (``hcf``, ``hcf_indoor``, ``hcf_small``)."""
     stage = stage_of(part, plan)
     source, target = (values[f"{part}.in.{side}"].double().numpy() for side in ("src", "tgt"))

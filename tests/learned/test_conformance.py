@@ -26,7 +26,7 @@ def test_every_output_agrees(recording) -> None:  # type: ignore[no-untyped-def]
     from compare import differences
 
     found = differences(recording)
-    assert len(found) == 25
+    assert len(found) == 27
     assert {name: value for name, value in found.items() if not value <= 1e-4} == {}
 
 

@@ -3,48 +3,32 @@
 
 from __future__ import annotations
 
-import os
-import subprocess
 import sys
 
 import numpy as np
 import pytest
 import torch
+from measured import peak_and_estimate
 from streets import street
 
 from hybridreg.learned import memory
 from hybridreg.learned.pyramid import build_pyramid
 from hybridreg.learned.sizes import named_config
 
-_MEASURE = """
-import numpy as np, torch
+_MADE = """
 from hybridreg.learned.batch import make_batch
-from hybridreg.learned.memory import forward_bytes
 from hybridreg.learned.network import RegistrationNetwork
-from hybridreg.learned.sizes import named_config
-from hybridreg.resources import peak_memory_mb, reset_peak_memory
-config = named_config("nano")
-rng = np.random.default_rng(0)
+network = RegistrationNetwork.named("nano")
 clouds = [rng.uniform(0, 70, (20000, 3)) * [1, 1, 0.02] for _ in range(2)]
-batch, network = make_batch(*clouds, config, subsample=False), RegistrationNetwork(config).eval()
-reset_peak_memory()
-before = peak_memory_mb()
-with torch.no_grad():
-    network(batch)
-print((peak_memory_mb() - before) * 2**20, forward_bytes(batch.pyramid, config))
+batch = make_batch(*clouds, network.config, subsample=False)
 """
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="peak memory is reset through /proc")
 def test_the_estimate_is_near_and_not_below() -> None:
-    # In a process of its own: this one holds freed memory that a forward pass would take first. Blocks that go back to
-    # the system at once leave the heap's slack out, which differs from run to run by some tens of megabytes.
-    at_once = {"MALLOC_MMAP_THRESHOLD_": "65536", "MALLOC_TRIM_THRESHOLD_": "65536"}
-    command = [sys.executable, "-c", _MEASURE]
-    printed = subprocess.run(
-        command, check=True, capture_output=True, text=True, env={**os.environ, **at_once}
-    ).stdout
-    real, estimate = map(float, printed.split())
+    # Blocks that go back to the system at once leave the heap's slack out, which differs from run to run by some tens
+    # of megabytes.
+    real, estimate = peak_and_estimate(_MADE)
     assert real <= estimate - memory.SLACK <= 1.25 * real
 
 

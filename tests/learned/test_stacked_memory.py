@@ -3,48 +3,32 @@
 
 from __future__ import annotations
 
-import os
-import subprocess
 import sys
 from typing import Any
 
 import pytest
 import torch
 from four_pairs import four_pairs
+from measured import peak_and_estimate
 
 from benchmarks.multiply_adds import count_multiply_adds
 from hybridreg.learned import memory
 from hybridreg.learned.cofinet.network import CofinetNetwork
 from hybridreg.learned.predator.network import PredatorNetwork
 
-_MEASURE = """
-import sys, numpy as np, torch
+_MADE = """
 from hybridreg.learned.batch import make_batch
-from hybridreg.learned.pretrained import network_class
-from hybridreg.resources import peak_memory_mb, reset_peak_memory
-cls = network_class(sys.argv[1])
-config = cls.named_config("nano")
-rng = np.random.default_rng(0)
+from hybridreg.learned.network_table import network_class
+network = network_class("{name}").named("nano")
 clouds = [rng.uniform(0, 70, (12000, 3)) * [1, 1, 0.02] for _ in range(2)]
-batch, network = make_batch(*clouds, config, subsample=False), cls(config).eval()
-reset_peak_memory()
-before = peak_memory_mb()
-with torch.no_grad():
-    network(batch)
-print((peak_memory_mb() - before) * 2**20, network.memory(batch))
+batch = make_batch(*clouds, network.config, subsample=False)
 """
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="peak memory is reset through /proc")
 @pytest.mark.parametrize("name", ["predator", "cofinet"])
 def test_the_estimate_is_near_and_not_below(name: str) -> None:
-    # As the same test of RegistrationNetwork: a process of its own, whose heap gives back at once.
-    at_once = {"MALLOC_MMAP_THRESHOLD_": "65536", "MALLOC_TRIM_THRESHOLD_": "65536"}
-    command = [sys.executable, "-c", _MEASURE, name]
-    printed = subprocess.run(
-        command, check=True, capture_output=True, text=True, env={**os.environ, **at_once}
-    ).stdout
-    real, estimate = map(float, printed.split())
+    real, estimate = peak_and_estimate(_MADE.format(name=name))
     assert real <= estimate  # what the allocator keeps differs from run to run by a tenth
     assert estimate - memory.SLACK <= 1.5 * real
 

@@ -13,8 +13,8 @@ from stacked_recordings import as_convolution, unsettle
 from hybridreg.learned.cofinet.config import named_config
 from hybridreg.learned.cofinet.network import CofinetNetwork
 from hybridreg.learned.cofinet.official_names import UNUSED, official_name
+from hybridreg.learned.network_table import network_class
 from hybridreg.learned.predator.network import PredatorNetwork
-from hybridreg.learned.pretrained import network_class
 
 
 @pytest.fixture(scope="module")
@@ -71,7 +71,7 @@ def test_a_folder_says_which_network_it_holds(tmp_path: Path) -> None:
     assert again.config == network.config
     assert not again.untrained()
     assert again.bin_score.dtype == torch.float32
-    with pytest.raises(ValueError, match="holds weights of cofinet; wanted are weights of predator"):
+    with pytest.raises(ValueError, match="weights of the network 'cofinet', not of 'predator'"):
         PredatorNetwork.from_pretrained(tmp_path / "own")
 
 

@@ -212,4 +212,4 @@ def test_configurations_that_fit_no_network_are_refused() -> None:
     with pytest.raises(ValueError, match=r"step=0.0 must lie in"):
         SelectionConfig(step=0.0)
     with pytest.raises(ValueError, match="expected one of 'masked', 'point0'"):
-        CofinetConfig.from_dict({"network": "cofinet", "padding": "zero"})
+        CofinetConfig.from_dict({"padding": "zero"})

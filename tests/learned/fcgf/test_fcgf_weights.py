@@ -15,6 +15,7 @@ from hybridreg.learned.fcgf.batch import FcgfBatch
 from hybridreg.learned.fcgf.config import FcgfConfig, FcgfLossConfig, named_config
 from hybridreg.learned.fcgf.network import FcgfNetwork
 from hybridreg.learned.fcgf.official_names import official_name
+from hybridreg.learned.network import RegistrationNetwork
 from hybridreg.learned.weights import from_pretrained
 
 
@@ -65,8 +66,11 @@ def test_a_checkpoint_is_read_from_its_shapes(
 
 def test_normalisation_must_be_told(tmp_path: Path) -> None:
     torch.save(published(FcgfNetwork(named_config("nano"))), tmp_path / "fcgf.pth")
-    with pytest.raises(TypeError, match="normalize"):
-        FcgfNetwork.load_official(tmp_path / "fcgf.pth")  # type: ignore[call-arg]
+    with pytest.raises(ValueError, match="say normalize=True or normalize=False"):
+        FcgfNetwork.load_official(tmp_path / "fcgf.pth")
+    with pytest.raises(ValueError, match="settles normalize and voxel too"):
+        FcgfNetwork.load_official(tmp_path / "fcgf.pth", "nano", normalize=True)
+    assert FcgfNetwork.load_official(tmp_path / "fcgf.pth", "nano").config == named_config("nano")
     assert FcgfNetwork.load_official(tmp_path / "fcgf.pth", normalize=True, voxel=0.7).config.voxel == 0.7
 
 
@@ -136,13 +140,12 @@ def test_a_saved_network_comes_back(nano_fcgf: FcgfNetwork, small_batch: FcgfBat
 
 def test_weights_of_another_network_are_refused(nano_fcgf: FcgfNetwork, tmp_path: Path) -> None:
     nano_fcgf.save_pretrained(tmp_path)
-    with pytest.raises(
-        ValueError, match="holds weights of fcgf; wanted are weights without the key 'network'"
-    ):
-        from_pretrained(tmp_path)
+    with pytest.raises(ValueError, match="weights of the network 'fcgf', not of 'cross3dreg'"):
+        RegistrationNetwork.from_pretrained(tmp_path)
+    assert isinstance(from_pretrained(tmp_path), FcgfNetwork)
     text = (tmp_path / "config.json").read_text()
     (tmp_path / "config.json").write_text(text.replace('"fcgf"', '"omnet"'))
-    with pytest.raises(ValueError, match="holds weights of omnet; wanted are weights of fcgf"):
+    with pytest.raises(ValueError, match="weights of the network 'omnet', not of 'fcgf'"):
         FcgfNetwork.from_pretrained(tmp_path)
     (tmp_path / "config.json").write_text(text.replace('"stride"', '"strid"'))
     with pytest.raises(ValueError, match=r"damaged: config: unknown keys \['strid'\]"):

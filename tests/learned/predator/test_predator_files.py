@@ -12,10 +12,10 @@ from stacked_recordings import as_convolution, made_batch, unsettle
 
 from hybridreg.learned import weights
 from hybridreg.learned.cofinet.network import CofinetNetwork
+from hybridreg.learned.network_table import network_class
 from hybridreg.learned.predator.config import named_config
 from hybridreg.learned.predator.network import PredatorNetwork
 from hybridreg.learned.predator.official_names import official_name
-from hybridreg.learned.pretrained import network_class
 
 
 def checkpoint(path: Path, network: torch.nn.Module, **changes: torch.Tensor | None) -> Path:
@@ -82,9 +82,8 @@ def test_a_folder_says_which_network_it_holds(tmp_path: Path) -> None:
     batch = made_batch(network.config, 400)
     with torch.no_grad():
         assert torch.equal(again(batch).source.features, network.eval()(batch).source.features)
-    with pytest.raises(ValueError, match="holds weights of predator; wanted are weights"):
-        weights.from_pretrained(tmp_path / "own")
-    with pytest.raises(ValueError, match="holds weights of predator; wanted are weights of cofinet"):
+    assert isinstance(weights.from_pretrained(tmp_path / "own"), PredatorNetwork)
+    with pytest.raises(ValueError, match="weights of the network 'predator', not of 'cofinet'"):
         CofinetNetwork.from_pretrained(tmp_path / "own")
 
 

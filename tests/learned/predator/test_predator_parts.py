@@ -215,7 +215,7 @@ def test_configurations_that_fit_no_network_are_refused() -> None:
     with pytest.raises(ValueError, match="too narrow for 4 stages"):
         PredatorConfig(graph=GraphConfig(dim=4, heads=1))
     with pytest.raises(ValueError, match="unknown keys"):
-        PredatorConfig.from_dict({"network": "predator", "width": 3})
+        PredatorConfig.from_dict({"width": 3})
 
 
 def test_the_decoder_halves_what_it_is_given() -> None:

@@ -96,7 +96,7 @@ def test_bad_clouds_are_told() -> None:
 def test_normals_of_published_weights_face_the_origin_wherever_the_sensor_was() -> None:
     cloud = np.random.default_rng(0).normal(size=(80, 3)) + [5.0, 0.0, 0.0]
     away = (np.array([50.0, 0.0, 0.0]),) * 2
-    released, ours = named_config("3dmatch"), named_config("small")
+    released, ours = named_config("roitr-3dmatch"), named_config("small")
     seen = [make_batch(cloud, cloud, c, viewpoints=away).target.normals[0] for c in (released, ours)]
     inward = (torch.from_numpy(cloud).float() * seen[0]).sum(1) <= 1e-6
     assert inward.all()

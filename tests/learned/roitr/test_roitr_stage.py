@@ -67,7 +67,7 @@ def test_random_weights_must_be_asked_for(tmp_path: Path) -> None:
 
 def test_weights_of_another_network_are_refused(tmp_path: Path) -> None:
     hr.GeoTransformer(untrained=True).save_pretrained(tmp_path)
-    with pytest.raises(ValueError, match="of the network 'geotransformer', not of 'roitr'"):
+    with pytest.raises(ValueError, match="of the network 'cross3dreg', not of 'roitr'"):
         hr.Roitr.from_pretrained(tmp_path)
     with pytest.raises(FileNotFoundError, match=r"no checkpoint .*gone.pth"):
         hr.Roitr.load_official(tmp_path / "gone.pth")
@@ -95,3 +95,12 @@ def test_another_voxel_and_too_many_points_are_told(shifted: Pair, tmp_path: Pat
     assert found.spacing == 0.5
     assert any("voxel of 0.5 m" in note for note in scene.notes)
     assert any("RoITr used 500 of" in note and "max_points" in note for note in scene.notes)
+
+
+def test_too_large_a_pair_is_refused(shifted: Pair, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    scene = hr.VoxelGrid(voxel=0.5)(shifted)
+    stage = hr.Roitr(weights=trained(tmp_path))
+    monkeypatch.setattr("hybridreg.learned.memory.available_bytes", lambda device: 10**6)
+    counts = f"{len(scene.target)} target and {len(scene.source)} source points"
+    with pytest.raises(ValueError, match=rf"{counts}.*voxel larger than 0.5 m, or crop"):
+        stage(scene, Overlap.full(len(scene.source), len(scene.target)))

@@ -72,9 +72,9 @@ def test_trained_weights(weights: dict[str, str], tmp_path: Path) -> None:
     assert np.array_equal(
         again(other, Overlap.full(len(other.source), len(other.target))).source, found.source
     )
-    with pytest.raises(ValueError, match="weights of cofinet; wanted are weights of predator"):
+    with pytest.raises(ValueError, match="weights of the network 'cofinet', not of 'predator'"):
         hr.Predator.from_pretrained(weights["cofinet"])
-    with pytest.raises(ValueError, match="tell their own configuration"):
+    with pytest.raises(ValueError, match="bring their own configuration"):
         hr.Predator.from_pretrained(weights["predator"], size="nano")
 
 

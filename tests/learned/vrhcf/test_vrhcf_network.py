@@ -5,18 +5,17 @@ from __future__ import annotations
 
 import dataclasses
 import json
-import os
-import subprocess
 import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 import torch
+from measured import peak_and_estimate
 from streets import moved, street, yaw
 
 from hybridreg.learned.vrhcf.config import ShellConv, SphereNetConfig, SurfaceConv, named_config
-from hybridreg.learned.vrhcf.cost import _SLACK, multiply_adds
+from hybridreg.learned.vrhcf.cost import SLACK, multiply_adds
 from hybridreg.learned.vrhcf.losses import hardest_in_batch
 from hybridreg.learned.vrhcf.matching import match_descriptors
 from hybridreg.learned.vrhcf.network import SphereNet, pad_sphere
@@ -122,7 +121,7 @@ def test_matching_as_released_lets_long_descriptors_win() -> None:
 
 def test_sizes_by_name() -> None:
     assert sum(p.numel() for p in SphereNet.named("small").parameters()) <= 3_000_000
-    published = SphereNet.named("3dmatch")
+    published = SphereNet.named("vrhcf-3dmatch")
     assert sum(p.numel() for p in published.parameters()) == 2_241_104 - 128  # less what nothing reads
     assert multiply_adds(published.config) == pytest.approx(2.88e9, rel=2e-3)
     assert (published.config.padding, published.config.frames, published.config.matching) == (
@@ -130,7 +129,7 @@ def test_sizes_by_name() -> None:
         "released",
         "channels",
     )
-    with pytest.raises(KeyError, match="known are nano, small, 3dmatch"):
+    with pytest.raises(KeyError, match="known are nano, small, vrhcf-3dmatch"):
         named_config("full")
 
 
@@ -158,13 +157,13 @@ def official(network: SphereNet) -> dict[str, torch.Tensor]:
 
 
 def test_a_checkpoint_of_the_authors_loads_strictly(tmp_path: Path) -> None:
-    network = made(named_config("3dmatch"), seed=3)
+    network = made(named_config("vrhcf-3dmatch"), seed=3)
     state = official(network)
     torch.save(state, tmp_path / "3DMatch_best.pkl")
     loaded = SphereNet.load_official(tmp_path / "3DMatch_best.pkl")
     assert all(torch.equal(t, loaded.state_dict()[n]) for n, t in network.state_dict().items())
     assert loaded.config.padding == "released"
-    right = dataclasses.replace(named_config("3dmatch"), padding="right")
+    right = dataclasses.replace(named_config("vrhcf-3dmatch"), padding="right")
     assert SphereNet.load_official(tmp_path / "3DMatch_best.pkl", right).config.padding == "right"
     for change, message in (
         (lambda s: s.pop("module.xyz_raising.bias"), "xyz_raising.bias is missing"),
@@ -197,32 +196,19 @@ def test_one_batch_of_training_is_enough_to_be_trained() -> None:
     assert network.untrained() == frozenset()
 
 
-_MEASURE = """
-import torch
+_MADE = """
 from hybridreg.learned.vrhcf.batch import SphereBatch
 from hybridreg.learned.vrhcf.network import SphereNet
-from hybridreg.resources import peak_memory_mb, reset_peak_memory
-torch.set_num_threads(1)
-network = SphereNet.named("small").eval()
+network = SphereNet.named("small")
 patches = torch.randn(64, network.config.patch_points, 3)
 batch = SphereBatch(target=patches, source=patches)
-reset_peak_memory()
-before = peak_memory_mb()
-with torch.no_grad():
-    network(batch)
-print((peak_memory_mb() - before) * 2**20, network.memory(batch))
 """
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="peak memory is reset through /proc")
 def test_the_memory_estimate_is_not_below() -> None:
-    at_once = {"MALLOC_MMAP_THRESHOLD_": "65536", "MALLOC_TRIM_THRESHOLD_": "65536"}
-    command = [sys.executable, "-c", _MEASURE]
-    printed = subprocess.run(
-        command, check=True, capture_output=True, text=True, env={**os.environ, **at_once}
-    ).stdout
-    real, estimate = map(float, printed.split())
-    assert real <= estimate <= 3.0 * real + 2 * _SLACK
+    real, estimate = peak_and_estimate(_MADE)
+    assert real <= estimate <= 3.0 * real + 2 * SLACK
 
 
 @pytest.mark.skipif(not torch.cuda.is_available(), reason="no GPU here")

@@ -79,7 +79,7 @@ def test_a_cap_that_was_asked_for_is_no_warning(shifted: Pair) -> None:
 def test_the_published_size_affords_some_hundreds() -> None:
     from hybridreg.learned.vrhcf.cost import multiply_adds
 
-    each = multiply_adds(named_config("3dmatch"))
+    each = multiply_adds(named_config("vrhcf-3dmatch"))
     assert 200 < stage_module._CPU_BUDGET / each / 2 < 1000
 
 
@@ -124,5 +124,5 @@ def test_wrong_fields_and_weights_are_refused(tmp_path: Path) -> None:
 def test_too_little_memory_is_told(shifted: Pair, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("hybridreg.learned.memory.available_bytes", lambda device="cpu": 10**6)
     scene = hr.VoxelGrid(voxel=0.5)(shifted)
-    with pytest.raises(ValueError, match=r"60 target and 60 source keypoints.*max_keypoints"):
+    with pytest.raises(ValueError, match=r"60 target and 60 source points.*max_keypoints"):
         STAGE(scene, full(scene))

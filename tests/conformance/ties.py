@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""How far apart arrays, lists of indices and lists of matches are, ties forgiven and counted."""
+"""How far apart lists of indices and of matches are, ties forgiven and counted."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 import torch
+from arrays import apart
 from scipy.spatial import cKDTree
 from torch import Tensor
 
@@ -17,7 +18,7 @@ TIE = 5e-6
 
 
 @dataclass
-class Found:
+class Compared:
     """Differences by output, each with its tolerance, and how many ties were forgiven."""
 
     values: dict[str, tuple[float, float]] = field(default_factory=dict)
@@ -33,6 +34,11 @@ class Found:
         """Equal to the last bit."""
         self.values[name] = (0.0 if torch.equal(value.to(want.dtype), want) else math.inf, 0.0)
 
+    def print_ties(self) -> None:
+        """Say how many were forgiven."""
+        for name, count in self.ties.items():
+            print(f"{name}: {count} ties forgiven")
+
     def tied(self, name: str, differing: Tensor, gaps: Tensor, tolerance: float) -> None:
         """Entries that differ must differ by a tie: ``gaps`` at them are below ``tolerance``; they are counted."""
         count = int(differing.sum())
@@ -40,17 +46,6 @@ class Found:
             self.ties[name] = count
         worst = float(gaps[differing].max()) if count else 0.0
         self.values[name] = (worst, tolerance)
-
-
-def apart(value: Tensor, want: Tensor) -> float:
-    """Largest absolute difference; infinity where shapes differ, or where one is not finite and the other is."""
-    if value.shape != want.shape:
-        return math.inf
-    if not value.numel():
-        return 0.0
-    value, want = value.detach().double(), want.double()
-    same = (value == want) | (value.isnan() & want.isnan())
-    return float(torch.where(same, 0.0, (value - want).abs().nan_to_num(nan=math.inf)).max())
 
 
 def rows_apart(ours: list[Tensor], theirs: list[Tensor], forgiven: int = 0) -> tuple[list[float], int]:

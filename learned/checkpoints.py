@@ -1,0 +1,67 @@
+# SPDX-License-Identifier: MIT
+"""Checkpoints as the authors of networks published them, read without running anything in them."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from torch import Tensor
+
+from hybridreg.io.files import read_whole
+from hybridreg.io.torch_file import parse_torch
+
+_ENDINGS = (".tar", ".pth", ".pt", ".pkl")
+# Under which of these a published file has its tensors, if not at the top.
+_KEYS = ("state_dict", "model")
+
+
+@dataclass(frozen=True)
+class Checkpoint:
+    """A published checkpoint: its tensors, and the settings that it was trained with, where the file has them."""
+
+    tensors: dict[str, Tensor]
+    settings: Mapping[str, Any] = field(default_factory=dict)
+
+    def number(self, name: str) -> float | None:
+        """A positive number among the settings."""
+        value = self.settings.get(name)
+        is_number = isinstance(value, (int, float)) and not isinstance(value, bool) and value > 0
+        return float(value) if is_number else None  # type: ignore[arg-type]
+
+
+def is_checkpoint(weights: str) -> bool:
+    """Is it the name of a published checkpoint, not of a folder?"""
+    return weights.endswith(_ENDINGS)
+
+
+def read_checkpoint(path: str | os.PathLike[str]) -> Checkpoint:
+    """Read a checkpoint with ``weights_only``: a bare state dict, or one under ``state_dict`` or ``model``.
+
+    The prefix ``module.`` of parallel training is taken off.
+
+    Raises
+    ------
+    FileNotFoundError
+        No such file.
+    ValueError
+        Damaged, with anything else inside than tensors and plain values, or without a state dict.
+    """
+    file = Path(path)
+    if not file.is_file():
+        raise FileNotFoundError(f"no checkpoint {os.fspath(path)!r}")
+    content = parse_torch(read_whole(file), str(file))
+    content = content if isinstance(content, dict) else {}
+    state = next((content[key] for key in _KEYS if isinstance(content.get(key), dict)), content)
+    if not state or not all(isinstance(value, Tensor) for value in state.values()):
+        raise ValueError(
+            f"{file} holds no state dict, neither at the top nor under {' or '.join(map(repr, _KEYS))}"
+        )
+    settings = content.get("config")
+    return Checkpoint(
+        {name.removeprefix("module."): tensor for name, tensor in state.items()},
+        settings if isinstance(settings, Mapping) else {},
+    )

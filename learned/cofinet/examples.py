@@ -1,0 +1,23 @@
+# SPDX-License-Identifier: MIT
+"""What a training step of CoFiNet looks at."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hybridreg.learned.batch import Batch, make_batch
+from hybridreg.learned.cofinet.config import CofinetConfig
+from hybridreg.learned.cofinet.targets import CofinetTargets, compute_targets
+from hybridreg.learned.true_pair import TruePair, torch_generator
+
+
+def example(pair: TruePair, config: CofinetConfig, rng: np.random.Generator) -> tuple[Batch, CofinetTargets]:
+    """The pyramid of a pair, and one draw of true pairs.
+
+    Raises
+    ------
+    ValueError
+        As `make_batch`.
+    """
+    batch = make_batch(pair.target.points, pair.source.points, config)
+    return batch, compute_targets(batch.pyramid, pair.transform, config, torch_generator(rng))

@@ -1,0 +1,38 @@
+# SPDX-License-Identifier: MIT
+"""What a training step of OMNet looks at."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import torch
+
+from hybridreg.learned.omnet import batch as batches
+from hybridreg.learned.omnet.batch import OmnetBatch, make_batch
+from hybridreg.learned.omnet.config import OmnetConfig
+from hybridreg.learned.omnet.targets import OmnetTargets, compute_targets
+from hybridreg.learned.true_pair import TruePair
+from hybridreg.scene import centre
+
+
+def example(pair: TruePair, config: OmnetConfig, rng: np.random.Generator) -> tuple[OmnetBatch, OmnetTargets]:
+    """Some points of a pair in units of its own, as the stage takes them, and the true pose in these units.
+
+    Raises
+    ------
+    ValueError
+        As `make_batch`.
+    """
+    places = (centre(pair.target), centre(pair.source))
+    batch, units = make_batch(pair.target.points, pair.source.points, config.points, rng, centres=places)
+    return batch, compute_targets(torch.from_numpy(units.normalised(pair.T_target_source)))
+
+
+def collate(examples: Sequence[tuple[OmnetBatch, OmnetTargets]]) -> tuple[OmnetBatch, OmnetTargets]:
+    """Several pairs as one step, which needs two at least."""
+    targets = [each for _, each in examples]
+    return batches.collate([batch for batch, _ in examples]), OmnetTargets(
+        transform=torch.cat([each.transform for each in targets]),
+        pose=torch.cat([each.pose for each in targets]),
+    )
