@@ -27,7 +27,7 @@ lint: install
 # Against the installed wheel, as a user's type checker sees it: a second environment that holds the wheel alone and
 # borrows the first one's packages.
 types: install
-	rm -rf build/types && $(PYTHON) -m venv build/types
+	rm -rf build/lib build/types && $(PYTHON) -m venv build/types
 	build/types/bin/python -m pip install --quiet --no-deps .
 	cd build/types/lib/python3*/site-packages && ls -d "$(CURDIR)"/.venv/lib/python3*/site-packages > borrowed.pth
 	cd build && ../$(BIN)/mypy --config-file ../pyproject.toml --python-executable types/bin/python -p hybridreg

@@ -22,13 +22,13 @@ import numpy as np
 import torch
 
 from benchmarks.multiply_adds import count_multiply_adds
-from hybridreg.learned.batch import Batch, make_batch
-from hybridreg.learned.config import NetworkConfig
-from hybridreg.learned.grid import grid_subsample
-from hybridreg.learned.lgr import local_to_global
-from hybridreg.learned.memory import forward_bytes
-from hybridreg.learned.network import RegistrationNetwork
-from hybridreg.learned.sizes import named_config
+from hybridreg.learned.cross3dreg.batch import Batch, make_batch
+from hybridreg.learned.cross3dreg.config import NetworkConfig
+from hybridreg.learned.cross3dreg.network import RegistrationNetwork
+from hybridreg.learned.cross3dreg.sizes import named_config
+from hybridreg.learned.matching.local_to_global import local_to_global
+from hybridreg.learned.memory_estimate import forward_bytes
+from hybridreg.learned.pyramid.grid_subsample import grid_subsample
 
 ROOT = Path(__file__).resolve().parents[1]
 

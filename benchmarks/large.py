@@ -22,10 +22,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.alternate import real_pairs
-from hybridreg import Pipeline, se3
+from hybridreg import Pipeline
 from hybridreg.classical.voxel import VoxelGrid
+from hybridreg.geometry import se3
 from hybridreg.pair import Pair
-from hybridreg.resources import peak_memory_mb, reset_peak_memory
+from hybridreg.runtime.resources import peak_memory_mb, reset_peak_memory
 from hybridreg.verdict import judge
 
 Array = NDArray[np.float64]

@@ -9,17 +9,17 @@ from typing import Any
 import torch
 from torch import nn
 
-from hybridreg.learned.backbone import KpconvFpn
-from hybridreg.learned.batch import Batch
 from hybridreg.learned.cofinet.network import CofinetNetwork, CofinetOutput
-from hybridreg.learned.encodings import Output
-from hybridreg.learned.kpconv import KPConv
-from hybridreg.learned.kpfcnn import KpfcnnDecoder
-from hybridreg.learned.message_attention import InterleavedAttention
-from hybridreg.learned.network import RegistrationNetwork
-from hybridreg.learned.patch_pairs import size_chunks
+from hybridreg.learned.cross3dreg.batch import Batch
+from hybridreg.learned.cross3dreg.encodings import Output
+from hybridreg.learned.cross3dreg.network import RegistrationNetwork
+from hybridreg.learned.geotransformer.kpconv_fpn import KpconvFpn
+from hybridreg.learned.geotransformer.structure_embedding import StructureEmbedding
+from hybridreg.learned.kpfcnn.kpfcnn import KpfcnnDecoder
+from hybridreg.learned.layers.kpconv import KPConv
+from hybridreg.learned.layers.message_attention import InterleavedAttention
+from hybridreg.learned.matching.patch_pairs import size_chunks
 from hybridreg.learned.predator.graph import EdgeConvolution
-from hybridreg.learned.structure_embedding import StructureEmbedding
 
 
 @torch.no_grad()

@@ -21,10 +21,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 import hybridreg as hr
-from hybridreg import se3
-from hybridreg._open3d import load_open3d
 from hybridreg.data import open_dataset, yaw_starts
+from hybridreg.geometry import se3
 from hybridreg.pair import LabelledPair
+from hybridreg.runtime.open3d import load_open3d
 
 Array = NDArray[np.float64]
 Method = Callable[[LabelledPair], Array]

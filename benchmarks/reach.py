@@ -17,9 +17,9 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.calibration import answered, is_right
 from hybridreg.data import open_dataset
-from hybridreg.extent import reach
+from hybridreg.geometry.extent import reach
+from hybridreg.verdict.training.calibration import answered, is_right
 
 # Metres.
 BORDERS = (0.0, 6.0, 12.0, 25.0, np.inf)

@@ -17,9 +17,9 @@ import torch
 from torch import Tensor
 
 from benchmarks.forward import crop, matrix_rate, real_cloud
-from hybridreg.learned.roitr.backbone import LevelFeatures
 from hybridreg.learned.roitr.batch import make_batch
 from hybridreg.learned.roitr.config import RoitrConfig, named_config
+from hybridreg.learned.roitr.encoder_decoder import LevelFeatures
 from hybridreg.learned.roitr.local_attention import LocalAttention, LocalBlock
 from hybridreg.learned.roitr.network import RoitrNetwork
 

@@ -9,9 +9,9 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from hybridreg import se3
-from hybridreg._open3d import load_open3d
+from hybridreg.geometry import se3
 from hybridreg.matches import Correspondences, Pose
+from hybridreg.runtime.open3d import load_open3d
 from hybridreg.scene import Scene
 from hybridreg.stage import Stage
 

@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybridreg import normals as surface
-from hybridreg._open3d import load_open3d
-from hybridreg.classical.nearest import nearest
+from hybridreg.geometry.nearest_descriptors import nearest
 from hybridreg.matches import Correspondences, Overlap
+from hybridreg.runtime.open3d import load_open3d
 from hybridreg.scene import Level, Scene
 from hybridreg.stage import Stage
 

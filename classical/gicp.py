@@ -9,15 +9,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hybridreg import limits, se3
 from hybridreg.classical.voxel import voxel_centroids
-from hybridreg.cores import n_threads
-from hybridreg.fitness import measure
+from hybridreg.config import limits
+from hybridreg.geometry import se3
+from hybridreg.geometry.fitness import measure
 from hybridreg.matches import Pose
 from hybridreg.normals import tree
+from hybridreg.runtime.cores import n_threads
+from hybridreg.runtime.optional_packages import load
 from hybridreg.scene import Scene
 from hybridreg.stage import Stage
-from hybridreg.wheels import load
 
 Array = NDArray[np.float64]
 
@@ -79,8 +80,8 @@ class Gicp(Stage):
             if rests and not last:
                 continue
             still = 1.0 if last else _COARSE
-            # One thread (`hybridreg.threads`): with more, the order of summation and so the last digits depend on the
-            # machine.
+            # One thread (`hybridreg.runtime.threads`): with more, the order of summation, and so the
+            # last digits, depend on the machine.
             found = small_gicp.align(
                 target,
                 source,

@@ -9,10 +9,11 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from hybridreg import limits, se3
 from hybridreg import normals as surface
-from hybridreg.cores import n_threads
+from hybridreg.config import limits
+from hybridreg.geometry import se3
 from hybridreg.matches import Pose
+from hybridreg.runtime.cores import n_threads
 from hybridreg.scene import Scene
 from hybridreg.stage import Stage
 

@@ -11,13 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from hybridreg import limits, wheels
 from hybridreg.classical.voxel import voxel_centroids
-from hybridreg.cores import n_threads
+from hybridreg.config import limits
 from hybridreg.matches import Correspondences, Pose
+from hybridreg.runtime import optional_packages as wheels
+from hybridreg.runtime.cores import n_threads
+from hybridreg.runtime.threads import on_one_core, single
 from hybridreg.scene import Scene
 from hybridreg.stage import Stage
-from hybridreg.threads import on_one_core, single
 
 Array = NDArray[np.float64]
 

@@ -8,12 +8,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hybridreg import limits, se3
 from hybridreg.classical.gicp import not_worse
+from hybridreg.config import limits
+from hybridreg.geometry import se3
 from hybridreg.matches import Pose
+from hybridreg.runtime.optional_packages import load
 from hybridreg.scene import Scene
 from hybridreg.stage import Stage
-from hybridreg.wheels import load
 
 # The map drops points beyond this range; the target is one scan, nothing of it is to be dropped.
 _EVERYTHING = 1e6

@@ -10,15 +10,15 @@ from typing import ClassVar, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from hybridreg import se3
 from hybridreg.classical import hypotheses
-from hybridreg.classical.consensus import Consensus
-from hybridreg.classical.rivals import modes
+from hybridreg.classical.pose_modes import modes
 from hybridreg.classical.svd import kabsch
+from hybridreg.geometry import se3
+from hybridreg.geometry.consensus import Consensus
 from hybridreg.matches import Correspondences, Pose
+from hybridreg.runtime.threads import single
 from hybridreg.scene import Scene
 from hybridreg.stage import Stage
-from hybridreg.threads import single
 
 Array = NDArray[np.float64]
 

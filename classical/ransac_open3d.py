@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from hybridreg._open3d import load_open3d
+from hybridreg.runtime.open3d import load_open3d
 
 if TYPE_CHECKING:
     from hybridreg.classical.ransac import Ransac

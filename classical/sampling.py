@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from hybridreg import limits
 from hybridreg.cloud import PointCloud
-from hybridreg.cores import n_threads
+from hybridreg.config import limits
 from hybridreg.gate import MIN_POINTS
 from hybridreg.pair import Pair
+from hybridreg.runtime.cores import n_threads
 from hybridreg.scene import Level, Scene
 from hybridreg.stage import Stage
 

@@ -9,7 +9,7 @@ from typing import ClassVar, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from hybridreg import se3
+from hybridreg.geometry import se3
 from hybridreg.matches import Correspondences, Pose
 from hybridreg.scene import Scene
 from hybridreg.stage import Stage

@@ -5,9 +5,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from hybridreg.classical.cells import voxel_cells, voxel_centroids
 from hybridreg.cloud import PointCloud
-from hybridreg.extent import reach, some
+from hybridreg.geometry.extent import reach, some
+from hybridreg.geometry.voxel_cells import voxel_cells, voxel_centroids
 from hybridreg.pair import Pair
 from hybridreg.resolution import comparable, default_voxel
 

@@ -9,10 +9,10 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from hybridreg import ground
-from hybridreg.extent import radii, reach
+from hybridreg.geometry import ground
+from hybridreg.geometry.extent import radii, reach
+from hybridreg.geometry.range_image import RangeImage, RangeImages
 from hybridreg.matches import Overlap
-from hybridreg.range_image import RangeImage, RangeImages
 from hybridreg.scene import Level, Scene
 from hybridreg.stage import Stage
 
@@ -44,7 +44,7 @@ class Visibility(Stage):
     ----------
     baseline : float or None
         How far apart the sensors may have stood, metres. None takes half of the shorter of the clouds' reaches
-        (`hybridreg.extent.reach`).
+        (`hybridreg.geometry.extent.reach`).
     """
 
     baseline: float | None = None

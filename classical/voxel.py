@@ -10,8 +10,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from hybridreg.classical.cells import voxel_centroids
 from hybridreg.classical.thinning import thinned
+from hybridreg.geometry.voxel_cells import voxel_centroids
 from hybridreg.pair import Pair
 from hybridreg.resolution import comparable, default_voxel
 from hybridreg.scene import Level, Scene

@@ -18,8 +18,7 @@ if (_root / "pyproject.toml").is_file() and (_root / "classical").is_dir():
 
 if TYPE_CHECKING:
     from hybridreg.api import register
-    from hybridreg.classical.birdseye import BirdsEye
-    from hybridreg.classical.candidates import Candidates
+    from hybridreg.candidates.candidates import Candidates
     from hybridreg.classical.fgr import Fgr
     from hybridreg.classical.fpfh import Fpfh
     from hybridreg.classical.gicp import Gicp
@@ -28,8 +27,9 @@ if TYPE_CHECKING:
     from hybridreg.classical.kiss import KissMatcher
     from hybridreg.classical.kiss_icp import KissIcp
     from hybridreg.classical.nothing import GivenMatches, Identity, NoMatch, NoOverlap, NoRefinement
+    from hybridreg.classical.overhead.birdseye import BirdsEye
+    from hybridreg.classical.overhead.relief_search import ReliefSearch
     from hybridreg.classical.ransac import Ransac
-    from hybridreg.classical.relief import ReliefSearch
     from hybridreg.classical.sampling import AllPoints, RandomSample
     from hybridreg.classical.svd import WeightedSvd
     from hybridreg.classical.visibility import Visibility
@@ -55,8 +55,8 @@ if TYPE_CHECKING:
 
 _WHERE = {
     "hybridreg.api": ["register"],
-    "hybridreg.classical.birdseye": ["BirdsEye"],
-    "hybridreg.classical.candidates": ["Candidates"],
+    "hybridreg.classical.overhead.birdseye": ["BirdsEye"],
+    "hybridreg.candidates.candidates": ["Candidates"],
     "hybridreg.classical.fgr": ["Fgr"],
     "hybridreg.classical.fpfh": ["Fpfh"],
     "hybridreg.classical.gicp": ["Gicp"],
@@ -66,7 +66,7 @@ _WHERE = {
     "hybridreg.classical.kiss_icp": ["KissIcp"],
     "hybridreg.classical.nothing": ["GivenMatches", "Identity", "NoMatch", "NoOverlap", "NoRefinement"],
     "hybridreg.classical.ransac": ["Ransac"],
-    "hybridreg.classical.relief": ["ReliefSearch"],
+    "hybridreg.classical.overhead.relief_search": ["ReliefSearch"],
     "hybridreg.classical.sampling": ["AllPoints", "RandomSample"],
     "hybridreg.classical.svd": ["WeightedSvd"],
     "hybridreg.classical.visibility": ["Visibility"],

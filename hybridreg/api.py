@@ -5,11 +5,11 @@ from __future__ import annotations
 
 from typing import Any, Literal
 
+from hybridreg.geometry.viewpoint import Given
 from hybridreg.pair import Gravity, Pair
 from hybridreg.pipeline import Pipeline
 from hybridreg.presets import DEFAULT
 from hybridreg.result import RegistrationResult
-from hybridreg.viewpoint import Given
 
 
 def register(

@@ -7,7 +7,8 @@ import os
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from hybridreg import presets, shipped_weights
+from hybridreg import presets
+from hybridreg.io import shipped_weights
 from hybridreg.pipeline import Pipeline
 from hybridreg.slots import SLOTS
 from hybridreg.spec import to_table

@@ -11,10 +11,11 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from hybridreg import extent, gate
+from hybridreg import gate
+from hybridreg.geometry import extent
+from hybridreg.geometry.range_image import RangeImage, RangeImages
+from hybridreg.geometry.viewpoint import Given, Seen, found, given
 from hybridreg.io import read_viewpoint
-from hybridreg.range_image import RangeImage, RangeImages
-from hybridreg.viewpoint import Given, Seen, found, given
 
 Array = NDArray[np.float64]
 
@@ -65,8 +66,9 @@ class PointCloud:
         ----------
         x : path, array, table or object that holds points
             Arrays and tensors (N, 3+), (3 to 6, N) or (H, W, 3+); records, tables and dictionaries with x, y and z by
-            name; ROS' PointCloud2, laspy's and Open3D's clouds, and whatever else keeps `points` (`hybridreg.held`).
-            Metres, unless a name tells another unit, as `X (mm)`. What is masked or missing is not finite.
+            name; ROS' PointCloud2, laspy's and Open3D's clouds, and whatever else keeps `points`
+            (`hybridreg.io.point_objects`). Metres, unless a name tells another unit, as `X (mm)`. What is masked or
+            missing is not finite.
         name : str
             What error messages call the cloud.
         nonfinite : "raise" or "drop"
@@ -76,7 +78,7 @@ class PointCloud:
             Where the sensor stood, in the coordinates of the points: one place, one for each point, or places and the
             row of each point's. "none" is honest for a map, a CAD model or a merged cloud whose sensors are not known:
             free space is not tested then. "auto" takes what the file says, or tests whether a sensor may have stood
-            at the origin (`hybridreg.viewpoint`).
+            at the origin (`hybridreg.geometry.viewpoint`).
 
         Raises
         ------

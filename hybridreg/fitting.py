@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hybridreg import gate, registry, units
-from hybridreg.extent import share_within
+from hybridreg import gate, registry
+from hybridreg.geometry import units
+from hybridreg.geometry.extent import share_within
 from hybridreg.pair import Pair
 from hybridreg.scene import Scene
 from hybridreg.slots import SLOTS

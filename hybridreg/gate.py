@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hybridreg.held import points_of
+from hybridreg.io.point_objects import points_of
 
 Array = NDArray[np.float64]
 

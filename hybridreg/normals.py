@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from hybridreg.runtime.optional_packages import load
 from hybridreg.scene import Level, Scene
-from hybridreg.wheels import load
 
 Array = NDArray[np.float64]
 Side = Literal["source", "target"]
@@ -43,8 +43,8 @@ def estimate(points: Array, viewpoint: Array | None, k: int = 20) -> Array:
     # All neighbours several times over tell the same.
     times = -(-_FEWEST // k)
     cloud = small_gicp.PointCloud(np.tile(points, (times, 1)))
-    # One thread (`hybridreg.threads`): with two, a level of 5,000 points took as long on idle cores, and 2.5 times as
-    # long on busy ones.
+    # One thread (`hybridreg.runtime.threads`): with two, a level of 5,000 points took as long on idle cores, and
+    # 2.5 times as long on busy ones.
     tree = small_gicp.KdTree(cloud, num_threads=1)
     small_gicp.estimate_normals(cloud, tree, times * k, 1)
     found: Array = cloud.normals()[: len(points), :3]

@@ -12,16 +12,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hybridreg import fitting, presets, shipped_weights, spec
+from hybridreg import fitting, presets, spec
 from hybridreg.cloud import PointCloud
 from hybridreg.frames import lower_matches, raise_matches, raise_pose
+from hybridreg.geometry.se3 import project
+from hybridreg.io import shipped_weights
 from hybridreg.matches import Correspondences, Overlap, Pose
 from hybridreg.pair import Pair
 from hybridreg.resolution import tolerance
-from hybridreg.resources import peak_memory_mb, reset_peak_memory, stopwatch
 from hybridreg.result import RegistrationResult
+from hybridreg.runtime.resources import peak_memory_mb, reset_peak_memory, stopwatch
 from hybridreg.scene import Scene
-from hybridreg.se3 import project
 from hybridreg.slots import SLOTS
 from hybridreg.stage import Stage, own_params
 
@@ -160,7 +161,7 @@ class Pipeline(Stage):
 
     def trace(self, pair: Pair, *, seed: int = 0, matches: Any = None) -> Trace:
         """Run the stages and keep what each of them made."""
-        from hybridreg.verdict.matched import of_most
+        from hybridreg.evidence.match_agreement import of_most
 
         fitting.check_image(self, pair)
         fitting.check_seed(seed)

@@ -9,7 +9,7 @@ from importlib import import_module
 from importlib.metadata import entry_points
 from typing import Any
 
-from hybridreg import plugins
+from hybridreg.runtime import plugins
 from hybridreg.slots import SLOTS
 
 ENTRY_POINTS = "hybridreg.stages"
@@ -39,9 +39,9 @@ BUILT_IN = {
     "estimate.fgr": "hybridreg.classical.fgr:Fgr",
     "estimate.hcf": "hybridreg.classical.hcf:Hcf",
     "estimate.kiss": "hybridreg.classical.kiss:KissMatcher",
-    "estimate.birdseye": "hybridreg.classical.birdseye:BirdsEye",
-    "estimate.relief": "hybridreg.classical.relief:ReliefSearch",
-    "estimate.candidates": "hybridreg.classical.candidates:Candidates",
+    "estimate.birdseye": "hybridreg.classical.overhead.birdseye:BirdsEye",
+    "estimate.relief": "hybridreg.classical.overhead.relief_search:ReliefSearch",
+    "estimate.candidates": "hybridreg.candidates.candidates:Candidates",
     "estimate.lgr": "hybridreg.learned.stages.lgr:Lgr",
     "estimate.omnet": "hybridreg.learned.omnet.stage:OmNet",
     "refine.none": "hybridreg.classical.nothing:NoRefinement",

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybridreg.cloud import PointCloud
-from hybridreg.extent import reach, share_within
+from hybridreg.geometry.extent import reach, share_within
 
 Array = NDArray[np.float64]
 

@@ -12,7 +12,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from hybridreg.fitness import Overlay
+from hybridreg.geometry.fitness import Overlay
 from hybridreg.matches import Correspondences
 from hybridreg.resolution import VEHICLES, Tolerance
 

@@ -16,7 +16,8 @@ from typing import Any
 
 import numpy as np
 
-from hybridreg import plain_values, registry
+from hybridreg import registry
+from hybridreg.config import plain_values
 from hybridreg.slots import SLOTS
 from hybridreg.stage import own_params
 

@@ -11,8 +11,8 @@ from typing import Any
 
 from torch import Tensor
 
-from hybridreg.io.files import read_whole
-from hybridreg.io.torch_file import parse_torch
+from hybridreg.io.formats.torch_file import parse_torch
+from hybridreg.io.whole_files import read_whole
 
 _ENDINGS = (".tar", ".pth", ".pt", ".pkl")
 # Under which of these a published file has its tensors, if not at the top.

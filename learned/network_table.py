@@ -14,7 +14,7 @@ DEFAULT = "cross3dreg"
 
 # Class of each network; a config.json names it under "network".
 NETWORKS = {
-    DEFAULT: "hybridreg.learned.network:RegistrationNetwork",
+    DEFAULT: "hybridreg.learned.cross3dreg.network:RegistrationNetwork",
     "fcgf": "hybridreg.learned.fcgf.network:FcgfNetwork",
     "predator": "hybridreg.learned.predator.network:PredatorNetwork",
     "cofinet": "hybridreg.learned.cofinet.network:CofinetNetwork",

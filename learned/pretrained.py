@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 from torch import nn
 
-from hybridreg.learned.loss_parts import Losses
+from hybridreg.learned.losses.loss_parts import Losses
 from hybridreg.learned.true_pair import TruePair
 from hybridreg.learned.untrained import untrained_parts
 from hybridreg.learned.weights import from_pretrained, save_pretrained

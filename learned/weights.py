@@ -15,10 +15,10 @@ from safetensors.torch import load_file, save
 from torch import Tensor, nn
 
 from hybridreg.io.atomic import write_bytes, write_text
+from hybridreg.io.shipped_weights import CONFIG_FILE, WEIGHTS_FILE, MissingWeights, find, names
 from hybridreg.io.structured import read_json
+from hybridreg.learned.geotransformer.official_names import official_name
 from hybridreg.learned.network_table import DEFAULT, NETWORKS, network_class
-from hybridreg.learned.official_names import official_name
-from hybridreg.shipped_weights import CONFIG_FILE, WEIGHTS_FILE, MissingWeights, find, names
 
 _FLOATS = (torch.float64, torch.float32, torch.float16, torch.bfloat16)
 

@@ -18,7 +18,7 @@ import hybridreg as hr
 from hybridreg import testing
 from hybridreg.eval import predict
 from hybridreg.pair import LabelledPair
-from hybridreg.threads import one_thread
+from hybridreg.runtime.threads import one_thread
 
 SECONDS = 60.0  # a child's; it takes 1 to 5
 
@@ -54,7 +54,7 @@ def after_others(preset: str) -> None:
     """The parent used the same libraries by itself, with the threads that they take by default."""
     import torch
 
-    from hybridreg._open3d import load_open3d
+    from hybridreg.runtime.open3d import load_open3d
 
     matrix = torch.rand(1_000, 1_000)
     for _ in range(3):

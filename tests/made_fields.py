@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 
 import hybridreg as hr
-from hybridreg import se3
+from hybridreg.geometry import se3
 from hybridreg.pair import Pair
 
 _WAVES = 40

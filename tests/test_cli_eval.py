@@ -12,10 +12,11 @@ import pytest
 from typer.testing import CliRunner, Result
 
 import hybridreg as hr
-from hybridreg import se3, testing
+from hybridreg import testing
 from hybridreg.cli import doctor
 from hybridreg.cli.app import app
 from hybridreg.eval import read
+from hybridreg.geometry import se3
 
 PLAIN = ["--set", "match=none", "--set", "estimate=identity", "--set", "refine=none", "--voxel", "0.5"]
 
@@ -43,7 +44,7 @@ def pairs(tmp_path: Path) -> Path:
 @pytest.fixture(autouse=True)
 def light_pages(monkeypatch: pytest.MonkeyPatch) -> None:
     """Pages without plotly's five megabytes; that they carry it is another test's business."""
-    monkeypatch.setattr("hybridreg.eval.figures.script", lambda: "")
+    monkeypatch.setattr("hybridreg.eval.report.plotly_figures.script", lambda: "")
 
 
 @pytest.fixture(autouse=True)

@@ -14,9 +14,10 @@ import pytest
 from typer.testing import CliRunner, Result
 
 import hybridreg as hr
-from hybridreg import se3, testing
+from hybridreg import testing
 from hybridreg.cli.app import app
-from hybridreg.fitness import Overlay
+from hybridreg.geometry import se3
+from hybridreg.geometry.fitness import Overlay
 from hybridreg.pipeline import Trace
 from hybridreg.result import RegistrationResult
 

@@ -12,8 +12,8 @@ from typer.testing import CliRunner, Result
 
 from hybridreg.cli.app import app
 from hybridreg.data import open_dataset
-from hybridreg.data.simulate import Drawn, folder
-from hybridreg.data.simulate.jpeg import encode
+from hybridreg.data.simulate import Drawn, simulated_folder
+from hybridreg.data.simulate.sensing.jpeg import encode
 
 
 def call(*arguments: str | Path) -> Result:
@@ -32,7 +32,7 @@ def drawn(monkeypatch: pytest.MonkeyPatch) -> list[int]:
         numbers.append(number)
         return replace(plain, source=points[: 500 + number % 100])
 
-    monkeypatch.setattr(folder, "draw", draw)
+    monkeypatch.setattr(simulated_folder, "draw", draw)
     return numbers
 
 

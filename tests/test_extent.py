@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 import hybridreg as hr
-from hybridreg.extent import bounds, radii, share_within
+from hybridreg.geometry.extent import bounds, radii, share_within
 
 
 @pytest.mark.parametrize("order", ["C", "F"])

@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hybridreg import fitness
+from hybridreg.geometry import fitness
 
 
 @pytest.mark.parametrize("spread", [10.0, 1e9])

@@ -86,7 +86,7 @@ def test_takes_a_torch_tensor() -> None:
 
 
 def test_takes_open3d_clouds() -> None:
-    from hybridreg._open3d import load_open3d
+    from hybridreg.runtime.open3d import load_open3d
 
     o3d = load_open3d()
     legacy = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(GOOD))

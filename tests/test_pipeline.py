@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 
 import hybridreg as hr
-from hybridreg import se3, testing
+from hybridreg import testing
+from hybridreg.geometry import se3
 from hybridreg.matches import Correspondences, Overlap, Pose
 from hybridreg.scene import Scene
 

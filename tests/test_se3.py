@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from hybridreg import se3
+from hybridreg.geometry import se3
 
 vectors = arrays(np.float64, 3, elements=st.floats(-3.1, 3.1))
 seeds = st.integers(0, 2**32 - 1)

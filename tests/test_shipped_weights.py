@@ -9,8 +9,9 @@ import pytest
 from typer.testing import CliRunner
 
 import hybridreg as hr
-from hybridreg import changes, shipped_weights, testing
+from hybridreg import changes, testing
 from hybridreg.cli.app import app
+from hybridreg.io import shipped_weights
 
 LEARNED = {"cross3dreg": "cross3dreg-small", "geotransformer": "geotransformer-small"}
 
@@ -26,8 +27,8 @@ def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def drop(package: Path) -> Path:
     """Weights dropped into it, as if they had been trained."""
     torch = pytest.importorskip("torch")
-    from hybridreg.learned.network import RegistrationNetwork
-    from hybridreg.learned.sizes import named_config
+    from hybridreg.learned.cross3dreg.network import RegistrationNetwork
+    from hybridreg.learned.cross3dreg.sizes import named_config
     from hybridreg.learned.weights import save_pretrained
 
     for preset, name in LEARNED.items():

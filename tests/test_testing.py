@@ -91,7 +91,7 @@ def test_an_unregistered_stage_must_name_its_slot() -> None:
 
 def test_the_sample_pair_has_the_pose_it_claims() -> None:
     scene, truth = testing.sample_scene()
-    from hybridreg.fitness import measure
+    from hybridreg.geometry.fitness import measure
 
     on, off = (measure(scene.source.points, scene.target.points, T, 0.4).fitness for T in (truth, np.eye(4)))
     assert on > 0.7

@@ -15,8 +15,9 @@ import pytest
 from threadpoolctl import threadpool_info
 
 import hybridreg as hr
-from hybridreg import cores, testing, threads
-from hybridreg.threads import one_thread, single
+from hybridreg import testing
+from hybridreg.runtime import cores, threads
+from hybridreg.runtime.threads import one_thread, single
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,8 @@ import warnings
 import numpy as np
 import pytest
 
-from hybridreg import Pair, Pipeline, PointCloud, testing, units
+from hybridreg import Pair, Pipeline, PointCloud, testing
+from hybridreg.geometry import units
 
 STREET = testing.sample_pair()[0]
 NOTHING = Pipeline(match="none", estimate="identity", refine="none")

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from hybridreg.cli import options
-from hybridreg.cli.faults import plainly
-from hybridreg.cli.stopping import going_on
+from hybridreg.cli.error_messages import plainly
+from hybridreg.cli.stop_signals import going_on
 
 if TYPE_CHECKING:
     from hybridreg.data.summary import Array, Summary
@@ -48,7 +48,7 @@ def kitti_list(
     workers: options.Workers = 1,
 ) -> None:
     """Make KITTI's pairs anew: the field's walk, and ICP composed as T_icp @ M; takes seconds a pair."""
-    from hybridreg.data import kitti_list as listing
+    from hybridreg.data.lists import kitti_list as listing
 
     with going_on(lambda: "nothing is written before the last pair: the same command begins anew"):
         print(f"written to {listing.write(root, split, workers)}")

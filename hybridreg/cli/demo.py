@@ -10,7 +10,7 @@ from typing import Annotated
 import typer
 
 from hybridreg.cli import options
-from hybridreg.cli.faults import VERDICT_FAILED, plainly
+from hybridreg.cli.error_messages import VERDICT_FAILED, plainly
 from hybridreg.cli.register import show
 
 
@@ -22,8 +22,9 @@ def command(
 ) -> None:
     """Align the embedded pair of clouds and compare with its true pose."""
     from hybridreg.changes import build
-    from hybridreg.data.folder import load_pair
-    from hybridreg.eval import metrics, single
+    from hybridreg.data.loaders.folder import load_pair
+    from hybridreg.eval.report import single_report
+    from hybridreg.eval.score import metrics
 
     method = build(options.changes_of(preset, None, None, None))
     with as_file(files("hybridreg.data").joinpath("demo")) as folder:
@@ -36,7 +37,7 @@ def command(
     rre = metrics.rre_deg(result.transformation, labelled.T_target_source)
     rte = metrics.rte_m(result.transformation, labelled.T_target_source)
     print(f"against the true pose: {rre:.2f} deg, {rte:.2f} m")
-    written = single.write(pair, result, out)
+    written = single_report.write(pair, result, out)
     print(f"written to {out}: {', '.join(file.name for file in written)}")
     if result.verdict == "failed":
         raise typer.Exit(VERDICT_FAILED)

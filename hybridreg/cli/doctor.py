@@ -8,7 +8,7 @@ import platform
 from collections.abc import Iterator
 from importlib.metadata import PackageNotFoundError, version
 
-from hybridreg.cli.faults import plainly, sentence
+from hybridreg.cli.error_messages import plainly, sentence
 
 # Module to distribution; what each is needed for.
 _NEEDED = {
@@ -52,7 +52,7 @@ def _installed(distribution: str) -> str:
 def _loads(module: str) -> str:
     try:
         if module == "open3d":
-            from hybridreg._open3d import load_open3d
+            from hybridreg.runtime.open3d import load_open3d
 
             load_open3d()
         else:

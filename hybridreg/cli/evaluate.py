@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from hybridreg.cli import options
-from hybridreg.cli.faults import plainly
+from hybridreg.cli.error_messages import plainly
 
 
 @plainly
@@ -27,12 +27,12 @@ def command(
     overwrite: options.Overwrite = False,
 ) -> None:
     """Predict the poses of a data set once, and score them; a run that was cut off goes on where it stood."""
-    from hybridreg.cli import running
-    from hybridreg.eval import recipe
+    from hybridreg.cli import table_running
+    from hybridreg.eval import table_file
     from hybridreg.presets import DEFAULT
 
     changes = options.changes_of(preset, pipeline, settings, voxel)
-    name = recipe.title_of(changes) if changes else DEFAULT
+    name = table_file.title_of(changes) if changes else DEFAULT
     content = {
         "title": f"Pipeline {name}",
         "seed": seed,
@@ -40,5 +40,5 @@ def command(
         "row": [{"name": name, **changes}],
         **({"protocols": protocols} if protocols else {}),
     }
-    folder = out or Path("runs") / recipe.slug(name)
-    running.run(recipe.parse(content), data, folder, workers=workers, overwrite=overwrite)
+    folder = out or Path("runs") / table_file.slug(name)
+    table_running.run(table_file.parse(content), data, folder, workers=workers, overwrite=overwrite)

@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from hybridreg.cli.faults import plainly
+from hybridreg.cli.error_messages import plainly
 
 
 class Kind(str, Enum):
@@ -37,7 +37,8 @@ def lines(kind: Kind) -> Iterator[str]:
     """The names of one kind, each with what it stands for."""
     from hybridreg import presets, registry
     from hybridreg.data import catalogue
-    from hybridreg.eval import protocols, recipe
+    from hybridreg.eval import table_file
+    from hybridreg.eval.score import protocols
     from hybridreg.learned import recipes
     from hybridreg.slots import SLOTS
 
@@ -49,7 +50,7 @@ def lines(kind: Kind) -> Iterator[str]:
         yield "a folder of pairs, by its path"
         yield from (f"{name}:..." for name in catalogue.names())
     elif kind is Kind.tables:
-        yield from recipe.known()
+        yield from table_file.known()
     elif kind is Kind.recipes:
         yield from recipes.names()
     elif kind is Kind.networks:
@@ -69,7 +70,8 @@ def _networks() -> Iterator[tuple[str, str]]:
 
 
 def _remark(preset: str) -> str:
-    from hybridreg import presets, shipped_weights
+    from hybridreg import presets
+    from hybridreg.io import shipped_weights
 
     try:
         shipped_weights.require(presets.load(preset), preset)

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from hybridreg.cli import options
-from hybridreg.cli.faults import VERDICT_FAILED, plainly
-from hybridreg.cli.spoken import spoken
+from hybridreg.cli.command_line_cures import spoken
+from hybridreg.cli.error_messages import VERDICT_FAILED, plainly
 
 if TYPE_CHECKING:
     from hybridreg.result import RegistrationResult
@@ -64,9 +64,9 @@ def command(
     result = method.run(pair, seed=seed)
     show(result)
     if out is not None:
-        from hybridreg.eval import single
+        from hybridreg.eval.report import single_report
 
-        files = single.write(pair, result, out)
+        files = single_report.write(pair, result, out)
         print(f"written to {out}: {', '.join(file.name for file in files)}")
     if result.verdict == "failed":
         raise typer.Exit(VERDICT_FAILED)

@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from hybridreg.cli import options
-from hybridreg.cli.faults import plainly
+from hybridreg.cli.error_messages import plainly
 
 if TYPE_CHECKING:
-    from hybridreg.eval.protocols import Protocol
-    from hybridreg.eval.table import Table
+    from hybridreg.eval.score.protocols import Protocol
+    from hybridreg.eval.table_run import Table
     from hybridreg.pair import LabelledPair
 
 
@@ -29,24 +29,24 @@ def command(
     ] = 0,
 ) -> None:
     """Write the reports of a table anew, under any protocol."""
-    from hybridreg.cli import running
-    from hybridreg.eval import table
-    from hybridreg.eval.protocols import protocol
+    from hybridreg.cli import table_running
+    from hybridreg.eval import table_run
+    from hybridreg.eval.score.protocols import protocol
 
     folder = paths[0] if len(paths) == 1 and paths[0].is_dir() else None
     if folder is not None:
-        done, names = table.load(folder), list(table.read_index(folder).protocols)
+        done, names = table_run.load(folder), list(table_run.read_index(folder).protocols)
     else:
-        done, names = table.of_files(paths), ["cross3dreg", "kitti"]
+        done, names = table_run.of_files(paths), ["cross3dreg", "kitti"]
     chosen = [protocol(name) for name in protocols or names]
     written, pairs = out or folder or Path("runs/report"), _data(done, data)
-    running.write(done, chosen, written, pairs)
+    table_running.write(done, chosen, written, pairs)
     if pictures:
         _draw(done, chosen[0], pairs, written / "pictures", pictures)
 
 
 def _draw(done: Table, chosen: Protocol, pairs: Sequence[LabelledPair] | None, folder: Path, n: int) -> None:
-    from hybridreg.eval.redrawing import redraw
+    from hybridreg.eval.report.rerun_for_pictures import redraw
 
     if pairs is None:
         raise ValueError(f"--pictures {n} needs the data {done.data!r}, which is not here; name it by --data")
@@ -55,7 +55,7 @@ def _draw(done: Table, chosen: Protocol, pairs: Sequence[LabelledPair] | None, f
 
 def _data(done: Table, data: str | None) -> Sequence[LabelledPair] | None:
     # The views are an extra: data that has gone must not keep anyone from scoring. Named, it must open.
-    from hybridreg.cli.running import with_starts
+    from hybridreg.cli.table_running import with_starts
     from hybridreg.data import open_dataset
 
     try:

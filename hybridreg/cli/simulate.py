@@ -10,8 +10,8 @@ from typing import Annotated
 import typer
 
 from hybridreg.cli import options
-from hybridreg.cli.faults import plainly
-from hybridreg.cli.stopping import going_on
+from hybridreg.cli.error_messages import plainly
+from hybridreg.cli.stop_signals import going_on
 
 
 @plainly
@@ -30,7 +30,7 @@ def command(
     from rich.console import Console
     from rich.progress import Progress
 
-    from hybridreg.data.simulate.folder import write_pairs
+    from hybridreg.data.simulate.simulated_folder import write_pairs
 
     written = write_pairs(out, tier=tier, pairs=pairs, seed=seed, split=split, voxel=voxel, workers=workers)
     with (

@@ -10,7 +10,7 @@ from typing import Annotated
 import typer
 
 from hybridreg.cli import options
-from hybridreg.cli.faults import plainly
+from hybridreg.cli.error_messages import plainly
 
 
 @plainly
@@ -28,11 +28,11 @@ def command(
     overwrite: options.Overwrite = False,
 ) -> None:
     """Run a table, print it, and write it as Markdown, LaTeX, CSV and one HTML page."""
-    from hybridreg.cli import running
-    from hybridreg.eval import recipe
-    from hybridreg.eval.protocols import protocol
+    from hybridreg.cli import table_running
+    from hybridreg.eval import table_file
+    from hybridreg.eval.score.protocols import protocol
 
-    read = recipe.read(file)
+    read = table_file.read(file)
     if protocols:
         read = dataclasses.replace(read, protocols=tuple(protocol(name) for name in protocols))
     if starts is not None:
@@ -41,4 +41,4 @@ def command(
     if not where:
         raise ValueError(f"{file} names no data; give --data, a folder of pairs or name:rest of a loader")
     folder = out or Path("runs") / Path(file).stem
-    running.run(read, where, folder, workers=workers, overwrite=overwrite)
+    table_running.run(read, where, folder, workers=workers, overwrite=overwrite)

@@ -10,8 +10,8 @@ from typing import Annotated
 import typer
 
 from hybridreg.cli import options
-from hybridreg.cli.faults import plainly
-from hybridreg.cli.stopping import Stopped, going_on
+from hybridreg.cli.error_messages import plainly
+from hybridreg.cli.stop_signals import Stopped, going_on
 
 
 @plainly
@@ -35,10 +35,11 @@ def command(
     workers: options.Workers = 1,
 ) -> None:
     """Train a network; stopped or killed, it goes on with --resume. Ends with weights and their card."""
-    from hybridreg.learned.training import data_choice, recipe_file
+    from hybridreg.learned.training import recipe_file
+    from hybridreg.learned.training.data import data_choice
     from hybridreg.learned.training.loop import CHECKPOINT
-    from hybridreg.learned.training.run import RunOptions, train
-    from hybridreg.learned.training.stopping import StopFlag
+    from hybridreg.learned.training.stop_flag import StopFlag
+    from hybridreg.learned.training.training_run import RunOptions, train
 
     wanted = recipe_file.read(recipe)
     if data:

@@ -2,18 +2,18 @@
 """Data sets: sequences of pairs with their true poses."""
 
 from hybridreg.data.catalogue import names, open_dataset
-from hybridreg.data.cross3dreg import Cross3DReg
-from hybridreg.data.cross_lidar import CrossLidar
 from hybridreg.data.dataset import Dataset
-from hybridreg.data.folder import PairFolder
-from hybridreg.data.helipr import HeLiPr
-from hybridreg.data.kitti import Kitti
-from hybridreg.data.listed import ListedPairs
-from hybridreg.data.pair_files import PairFiles
-from hybridreg.data.starts import YawStarts, yaw_starts
-from hybridreg.data.threedcsr import ThreeDCsr
-from hybridreg.data.threedmatch import ThreeDMatch
-from hybridreg.data.tiers import Tiers
+from hybridreg.data.lists.listed import ListedPairs
+from hybridreg.data.lists.pair_files import PairFiles
+from hybridreg.data.loaders.cross3dreg import Cross3DReg
+from hybridreg.data.loaders.cross_lidar import CrossLidar
+from hybridreg.data.loaders.folder import PairFolder
+from hybridreg.data.loaders.helipr import HeLiPr
+from hybridreg.data.loaders.kitti import Kitti
+from hybridreg.data.loaders.threedcsr import ThreeDCsr
+from hybridreg.data.loaders.threedmatch import ThreeDMatch
+from hybridreg.data.loaders.tiers import Tiers
+from hybridreg.data.yaw_starts import YawStarts, yaw_starts
 
 __all__ = [
     "Cross3DReg",

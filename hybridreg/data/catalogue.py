@@ -11,22 +11,22 @@ from importlib.metadata import entry_points
 from operator import attrgetter
 from pathlib import Path
 
-from hybridreg import plugins
 from hybridreg.pair import LabelledPair
+from hybridreg.runtime import plugins
 
 ENTRY_POINTS = "hybridreg.datasets"
 
 # A loader takes the text after the colon and gives a sequence of labelled pairs.
 BUILT_IN = {
-    "3dcsr": "hybridreg.data.threedcsr:ThreeDCsr.from_text",
-    "3dmatch": "hybridreg.data.threedmatch:ThreeDMatch.from_text",
-    "cross-lidar": "hybridreg.data.cross_lidar:CrossLidar.from_text",
-    "cross3dreg": "hybridreg.data.cross3dreg:Cross3DReg.from_text",
-    "folder": "hybridreg.data.folder:PairFolder",
-    "helipr": "hybridreg.data.helipr:HeLiPr.from_text",
-    "kitti": "hybridreg.data.kitti:Kitti.from_text",
-    "sim": "hybridreg.data.simulated:Simulated",
-    "tiers": "hybridreg.data.tiers:Tiers.from_text",
+    "3dcsr": "hybridreg.data.loaders.threedcsr:ThreeDCsr.from_text",
+    "3dmatch": "hybridreg.data.loaders.threedmatch:ThreeDMatch.from_text",
+    "cross-lidar": "hybridreg.data.loaders.cross_lidar:CrossLidar.from_text",
+    "cross3dreg": "hybridreg.data.loaders.cross3dreg:Cross3DReg.from_text",
+    "folder": "hybridreg.data.loaders.folder:PairFolder",
+    "helipr": "hybridreg.data.loaders.helipr:HeLiPr.from_text",
+    "kitti": "hybridreg.data.loaders.kitti:Kitti.from_text",
+    "sim": "hybridreg.data.loaders.simulated:Simulated",
+    "tiers": "hybridreg.data.loaders.tiers:Tiers.from_text",
 }
 
 

@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hybridreg import se3
-from hybridreg.data import azimuth
-from hybridreg.data.direction import Direction, overlap, spread
-from hybridreg.data.listed import ListedPairs
+from hybridreg.data.lists import azimuth
+from hybridreg.data.lists.direction import Direction, overlap, spread
+from hybridreg.data.lists.listed import ListedPairs
+from hybridreg.geometry import se3
 from hybridreg.pair import LabelledPair
 
 Array = NDArray[np.float64]
@@ -33,7 +33,7 @@ class Summary:
         Pairs in the set; read for this; of those, with a photograph.
     fields : tuple of str
         Columns of the data set's own list.
-    roles : mapping of "source" and "target" to counts by (sensor's name, kind by `hybridreg.data.azimuth`)
+    roles : mapping of "source" and "target" to counts by (sensor's name, kind by `hybridreg.data.lists.azimuth`)
     points : mapping of "source" and "target" to the median number of points
     translation_m, rotation_deg : (n,)
         Size of the true motions: the errors of the identity.

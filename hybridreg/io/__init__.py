@@ -2,8 +2,8 @@
 """Reading clouds and photographs; writing clouds, transforms and records."""
 
 from hybridreg.io.atomic import atomic_path, write_bytes, write_text
-from hybridreg.io.image import as_image, check_image, read_image
-from hybridreg.io.points import read_points, read_viewpoint
+from hybridreg.io.formats.image import as_image, check_image, read_image
+from hybridreg.io.point_files import read_points, read_viewpoint
 from hybridreg.io.write import write_json, write_matrix, write_points
 
 __all__ = [

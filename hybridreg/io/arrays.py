@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from hybridreg.io.column_names import axes_in
 from hybridreg.io.faults import fault
-from hybridreg.io.names import axes_in
-from hybridreg.io.records import stack_axes
+from hybridreg.io.record_fields import stack_axes
 
 Array = NDArray[np.float64]
 

@@ -9,7 +9,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from hybridreg.io.files import read_whole
+from hybridreg.io.whole_files import read_whole
 
 if sys.version_info >= (3, 11):
     import tomllib

@@ -5,7 +5,7 @@
 >>> check_stage(MyMatcher(), "match")
 """
 
-from hybridreg.testing.samples import sample_pair, sample_scene, true_matches
-from hybridreg.testing.stages import check_stage, checks, slot_of
+from hybridreg.testing.small_inputs import sample_pair, sample_scene, true_matches
+from hybridreg.testing.stage_checks import check_stage, checks, slot_of
 
 __all__ = ["check_stage", "checks", "sample_pair", "sample_scene", "slot_of", "true_matches"]

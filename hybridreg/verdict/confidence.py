@@ -2,7 +2,7 @@
 """From evidence to a probability that the pose is right.
 
 Boosted trees on the pose's evidence, its support among it, and on how its best rival does beside it; see
-`benchmarks.verdict_weights`, which fits them. Whatever speaks for the pose can only raise the probability, whatever
+`hybridreg.verdict.training.fit`, which fits them. Whatever speaks for the pose can only raise the probability, whatever
 speaks against it, its best rival included, can only lower it.
 """
 
@@ -91,7 +91,7 @@ def believed(log_odds: float, rival_margin: float) -> float:
 
 @lru_cache(maxsize=1)
 def trees() -> Boosted:
-    """The trees in `confidence.json`, which `python -m benchmarks.verdict_weights` writes."""
+    """The trees in `confidence.json`, which `python -m hybridreg.verdict.training.fit` writes."""
     return Boosted.read(json.loads(files("hybridreg.verdict").joinpath("confidence.json").read_text()))
 
 

@@ -8,17 +8,18 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from hybridreg.fitness import Overlay
+from hybridreg.evidence import match_agreement, support, views
+from hybridreg.evidence.agreement import Agreement, OneWay
+from hybridreg.evidence.information import Information
+from hybridreg.evidence.scale import Size, size
+from hybridreg.evidence.surface_distance import closeness
+from hybridreg.evidence.views import View
+from hybridreg.geometry.fitness import Overlay
 from hybridreg.matches import Correspondences, Pose
 from hybridreg.scene import Scene
-from hybridreg.verdict import matched, rivals, support, views
-from hybridreg.verdict.agreement import Agreement, OneWay
-from hybridreg.verdict.closeness import closeness
+from hybridreg.search import rivals
+from hybridreg.search.rivals import Rival
 from hybridreg.verdict.confidence import DOUBTED, NEARLY, NO_RIVAL, Word, confidence, word
-from hybridreg.verdict.information import Information
-from hybridreg.verdict.rivals import Rival
-from hybridreg.verdict.similarity import Size, size
-from hybridreg.verdict.views import View
 from hybridreg.verdict.words import reasons
 
 Array = NDArray[np.float64]
@@ -60,7 +61,7 @@ class Judgement:
     overlay : Overlay
         The whole clouds under the pose, within twice the scene's spacing of one another.
     information : (6, 6) float64
-        See `hybridreg.verdict.information.Information`.
+        See `hybridreg.evidence.information.Information`.
     rivals : (r, 4, 4) float64
         Poses that explain the data nearly as well, best first.
     """
@@ -81,7 +82,10 @@ def judge(scene: Scene, pose: Pose, matches: Correspondences) -> Judgement:
     same whatever voxel the pipeline used. A pose that was not found is judged as what it is, a placeholder: failed.
     """
     weighed = weigh(scene, pose)
-    evidence = {**weighed.evidence, "matches_agreeing": float(matched.agreeing(scene, matches, pose.T))}
+    evidence = {
+        **weighed.evidence,
+        "matches_agreeing": float(match_agreement.agreeing(scene, matches, pose.T)),
+    }
     probability = weighed.confidence if pose.found else 0.0
     if scene.explanations:
         probability = min(probability, DOUBTED)
@@ -119,7 +123,7 @@ def _weigh(scene: Scene, pose: Pose) -> Weighed:
         pose.T,
         support.support(support.numbers(agreement, held)),
         pose.recipes,
-        matched.share(scene, pose.T),
+        match_agreement.share(scene, pose.T),
     )
     own, *found = rivals.told_apart(scene, [own, *found])
     found.sort(key=lambda rival: -rival.support)

@@ -7,9 +7,9 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-from hybridreg.verdict.agreement import Agreement
+from hybridreg.evidence.agreement import Agreement
+from hybridreg.evidence.information import Information
 from hybridreg.verdict.confidence import NEARLY, SIZE_GAIN
-from hybridreg.verdict.information import Information
 
 # Where a number becomes worth a sentence. In simulated scenes nine in ten right poses stayed on the good side.
 LOOKED_THROUGH, AGREEMENT, WEAK, OVERLAP, FEW = 0.12, 0.3, 0.02, 0.15, 60

@@ -5,9 +5,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from hybridreg.learned.batch import Batch, make_batch
 from hybridreg.learned.cofinet.config import CofinetConfig
 from hybridreg.learned.cofinet.targets import CofinetTargets, compute_targets
+from hybridreg.learned.cross3dreg.batch import Batch, make_batch
 from hybridreg.learned.true_pair import TruePair, torch_generator
 
 

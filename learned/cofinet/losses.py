@@ -9,8 +9,8 @@ import torch
 from torch import Tensor
 
 from hybridreg.learned.cofinet.config import CofinetLossConfig
+from hybridreg.learned.cofinet.point_transport import either_best
 from hybridreg.learned.cofinet.targets import CofinetTargets
-from hybridreg.learned.cofinet.transport import either_best
 
 _FOUND = 0.1
 

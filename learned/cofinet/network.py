@@ -11,23 +11,23 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional as F
 
-from hybridreg.learned.batch import Batch
 from hybridreg.learned.checkpoints import read_checkpoint
-from hybridreg.learned.cofinet.attention import PairTransformer, scores
 from hybridreg.learned.cofinet.config import SIZES, CofinetConfig, named_config
 from hybridreg.learned.cofinet.examples import example
 from hybridreg.learned.cofinet.losses import CofinetLosses, cofinet_losses
 from hybridreg.learned.cofinet.official_names import UNUSED, official_name
 from hybridreg.learned.cofinet.patching import PatchIndex, patch_index
+from hybridreg.learned.cofinet.point_transport import MASKED, alternating_sinkhorn, either_best
 from hybridreg.learned.cofinet.selection import NodePairs, Tried, select
 from hybridreg.learned.cofinet.targets import CofinetTargets
-from hybridreg.learned.cofinet.transport import MASKED, alternating_sinkhorn, either_best
-from hybridreg.learned.kpfcnn import KpfcnnDecoder, KpfcnnEncoder
-from hybridreg.learned.message_attention import Clouds, Masks
-from hybridreg.learned.point_matching import PointMatches
+from hybridreg.learned.cofinet.transformer import PairTransformer, scores
+from hybridreg.learned.cross3dreg.batch import Batch
+from hybridreg.learned.kpfcnn.kpfcnn import KpfcnnDecoder, KpfcnnEncoder
+from hybridreg.learned.kpfcnn.stacked_memory import encoder_bytes
+from hybridreg.learned.layers.message_attention import Clouds, Masks
+from hybridreg.learned.matching.point_matching import PointMatches
+from hybridreg.learned.matching.sinkhorn import kernel_sinkhorn, log_sinkhorn
 from hybridreg.learned.pretrained import Pretrained
-from hybridreg.learned.sinkhorn import kernel_sinkhorn, log_sinkhorn
-from hybridreg.learned.stacked_memory import encoder_bytes
 from hybridreg.learned.weights import load_official_tensors
 
 _FLOAT = 4

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import re
 
-from hybridreg.learned.kpfcnn_names import attention_name, block_name
+from hybridreg.learned.kpfcnn.kpfcnn_names import attention_name, block_name
 
 # In every checkpoint, and read by no computation.
 UNUSED = ("l_bin_score", "encoder.epsilon")

@@ -9,7 +9,7 @@ from typing import Literal
 from torch import Tensor
 from torch.nn import functional as F
 
-from hybridreg.learned.patches import build_patches
+from hybridreg.learned.pyramid.patches import build_patches
 
 
 @dataclass(frozen=True)

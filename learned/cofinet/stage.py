@@ -56,8 +56,8 @@ class Cofinet(StackedStage):
     def __call__(self, scene: Scene, overlap: Overlap) -> Correspondences:
         import torch
 
-        from hybridreg.learned.stages.arrays import array
         from hybridreg.learned.stages.drawing import draw
+        from hybridreg.learned.stages.tensor_values import array
 
         self.note_random(scene)
         network: CofinetNetwork = self.network()
@@ -97,8 +97,8 @@ class Cofinet(StackedStage):
     def _kept(self, cloud: CofinetCloud, level: Level, probability: NDArray[np.float64]) -> Tensor:
         import torch
 
-        from hybridreg.learned.stages.arrays import array
         from hybridreg.learned.stages.spreading import gather
+        from hybridreg.learned.stages.tensor_values import array
 
         kept = gather(probability, level.points, array(cloud.nodes)) > self.min_overlap
         # A mask that is one everywhere says nothing, and neither does one that leaves nothing.

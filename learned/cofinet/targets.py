@@ -11,10 +11,10 @@ from torch.nn import functional as F
 
 from hybridreg.learned.cofinet.config import CofinetConfig
 from hybridreg.learned.cofinet.patching import PatchIndex, patch_index
-from hybridreg.learned.neighbors import pairs_within
-from hybridreg.learned.patches import build_patches
-from hybridreg.learned.procrustes import apply_transform
-from hybridreg.learned.pyramid import Pyramid
+from hybridreg.learned.matching.procrustes import apply_transform
+from hybridreg.learned.pyramid.neighbors import pairs_within
+from hybridreg.learned.pyramid.patches import build_patches
+from hybridreg.learned.pyramid.point_pyramid import Pyramid
 
 
 @dataclass(frozen=True, kw_only=True)

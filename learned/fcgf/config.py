@@ -8,8 +8,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
-from hybridreg import limits
-from hybridreg.plain_values import build
+from hybridreg.config import limits
+from hybridreg.config.plain_values import build
 
 # What no network has is refused before memory is asked for it.
 _WIDEST, _WIDEST_KERNEL, _MOST_LEVELS = 8192, 9, 8

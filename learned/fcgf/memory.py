@@ -9,7 +9,7 @@ from typing import NamedTuple
 from hybridreg.learned.fcgf.config import FcgfConfig
 from hybridreg.learned.layers.sparse_conv import FEW_CHANNELS
 from hybridreg.learned.layers.voxels import VoxelPyramid
-from hybridreg.learned.memory import SLACK
+from hybridreg.learned.memory_estimate import SLACK
 
 _FLOAT, _INDEX = 4, 8
 _PER_PAIR = 2 * _INDEX  # a list of pairs keeps its inputs and its outputs

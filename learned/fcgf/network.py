@@ -21,7 +21,7 @@ from hybridreg.learned.fcgf.targets import FcgfTargets
 from hybridreg.learned.layers.kernel_maps import KernelMap
 from hybridreg.learned.layers.sparse_conv import SparseConv
 from hybridreg.learned.layers.voxels import VoxelPyramid
-from hybridreg.learned.loss_parts import LossParts
+from hybridreg.learned.losses.loss_parts import LossParts
 from hybridreg.learned.pretrained import Pretrained
 from hybridreg.learned.weights import load_official_tensors
 

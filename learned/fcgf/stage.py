@@ -54,9 +54,9 @@ class Fcgf(NetworkStage):
         import torch
 
         from hybridreg.learned.fcgf.batch import make_batch
-        from hybridreg.learned.memory import require_bytes
-        from hybridreg.learned.stages.arrays import array
+        from hybridreg.learned.memory_estimate import require_bytes
         from hybridreg.learned.stages.network_grid import note_grid
+        from hybridreg.learned.stages.tensor_values import array
 
         network: FcgfNetwork = self.network()
         voxel = network.config.voxel

@@ -12,7 +12,7 @@ from torch import Tensor
 
 from hybridreg.learned.fcgf.batch import FcgfBatch
 from hybridreg.learned.fcgf.config import FcgfConfig, FcgfLossConfig
-from hybridreg.learned.procrustes import apply_transform
+from hybridreg.learned.matching.procrustes import apply_transform
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -8,8 +8,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
-from hybridreg import limits
-from hybridreg.plain_values import build
+from hybridreg.config import limits
+from hybridreg.config.plain_values import build
 
 # What no network has is refused before memory is asked for it.
 _WIDEST, _MOST_LAYERS, _MOST_ITERATIONS, _MOST_POINTS = 8192, 16, 32, 100_000

@@ -9,7 +9,7 @@ import torch
 from torch import Tensor
 from torch.nn import functional as F
 
-from hybridreg.learned.loss_parts import LossParts
+from hybridreg.learned.losses.loss_parts import LossParts
 from hybridreg.learned.omnet.config import OmnetLossConfig
 from hybridreg.learned.omnet.targets import OmnetTargets, overlap_labels
 

@@ -11,11 +11,11 @@ import torch
 from torch import Tensor, nn
 
 from hybridreg.learned.checkpoints import read_checkpoint
-from hybridreg.learned.memory import SLACK
+from hybridreg.learned.memory_estimate import SLACK
 from hybridreg.learned.omnet.batch import OmnetBatch
 from hybridreg.learned.omnet.config import SIZES, OmnetConfig, named_config
 from hybridreg.learned.omnet.examples import collate, example
-from hybridreg.learned.omnet.layers import Decoder, Encoder, Fusion, Regression
+from hybridreg.learned.omnet.iteration_parts import Decoder, Encoder, Fusion, Regression
 from hybridreg.learned.omnet.losses import OmnetLosses, omnet_losses
 from hybridreg.learned.omnet.official_names import config_of, official_name
 from hybridreg.learned.omnet.quaternions import compose, matrix_of, rotate

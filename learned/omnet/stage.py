@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from hybridreg import se3
+from hybridreg.geometry import se3
 from hybridreg.learned.stages.network_stage import NetworkStage
 from hybridreg.matches import Correspondences, Pose
 from hybridreg.scene import Scene, centre
@@ -46,9 +46,9 @@ class OmNet(NetworkStage):
     def __call__(self, scene: Scene, matches: Correspondences, rng: np.random.Generator) -> Pose:
         import torch
 
-        from hybridreg.learned.memory import require_bytes
+        from hybridreg.learned.memory_estimate import require_bytes
         from hybridreg.learned.omnet.batch import make_batch
-        from hybridreg.learned.stages.arrays import array
+        from hybridreg.learned.stages.tensor_values import array
 
         network: OmnetNetwork = self.network()
         self.note_random(scene)

@@ -8,9 +8,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from hybridreg import limits
-from hybridreg.learned.kpfcnn_config import KpfcnnConfig, architecture
-from hybridreg.plain_values import build
+from hybridreg.config import limits
+from hybridreg.config.plain_values import build
+from hybridreg.learned.kpfcnn.kpfcnn_config import KpfcnnConfig, architecture
 
 _WIDEST, _MOST_BLOCKS = 8192, 64
 

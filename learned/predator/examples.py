@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hybridreg.learned.batch import Batch, make_batch
+from hybridreg.learned.cross3dreg.batch import Batch, make_batch
 from hybridreg.learned.predator.config import PredatorConfig
 from hybridreg.learned.predator.targets import PredatorTargets, compute_targets
 from hybridreg.learned.true_pair import TruePair, torch_generator

@@ -9,9 +9,9 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional as F
 
-from hybridreg.learned.distances import squared_distances
-from hybridreg.learned.instance_norm import instance_norm
-from hybridreg.learned.message_attention import Clouds, MessageBlock
+from hybridreg.learned.layers.distances import squared_distances
+from hybridreg.learned.layers.instance_norm import instance_norm
+from hybridreg.learned.layers.message_attention import Clouds, MessageBlock
 
 _SLOPE = 0.2
 

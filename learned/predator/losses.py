@@ -10,11 +10,11 @@ import torch
 from torch import Tensor
 from torch.nn import functional as F
 
-from hybridreg.learned.circle_loss import circle
-from hybridreg.learned.distances import squared_distances
+from hybridreg.learned.layers.distances import squared_distances
+from hybridreg.learned.losses.circle_loss import circle
+from hybridreg.learned.matching.procrustes import apply_transform
 from hybridreg.learned.predator.config import PredatorLossConfig
 from hybridreg.learned.predator.targets import PredatorTargets
-from hybridreg.learned.procrustes import apply_transform
 
 # Squared distances below are cut, and their gradient with them.
 _NEAREST = 1e-12

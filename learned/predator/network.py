@@ -11,9 +11,10 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional as F
 
-from hybridreg.learned.batch import Batch
 from hybridreg.learned.checkpoints import read_checkpoint
-from hybridreg.learned.kpfcnn import KpfcnnDecoder, KpfcnnEncoder
+from hybridreg.learned.cross3dreg.batch import Batch
+from hybridreg.learned.kpfcnn.kpfcnn import KpfcnnDecoder, KpfcnnEncoder
+from hybridreg.learned.kpfcnn.stacked_memory import encoder_bytes
 from hybridreg.learned.predator.config import SIZES, PredatorConfig, named_config
 from hybridreg.learned.predator.examples import example
 from hybridreg.learned.predator.graph import GraphNetwork
@@ -21,8 +22,7 @@ from hybridreg.learned.predator.losses import PredatorLosses, predator_losses
 from hybridreg.learned.predator.official_names import config_name, official_name
 from hybridreg.learned.predator.targets import PredatorTargets
 from hybridreg.learned.pretrained import Pretrained
-from hybridreg.learned.pyramid import Pyramid
-from hybridreg.learned.stacked_memory import encoder_bytes
+from hybridreg.learned.pyramid.point_pyramid import Pyramid
 from hybridreg.learned.weights import load_official_tensors
 
 

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 
 from torch import Tensor
 
-from hybridreg.learned.kpfcnn_names import attention_name, block_name, nearest_config
+from hybridreg.learned.kpfcnn.kpfcnn_names import attention_name, block_name, nearest_config
 
 _RULES = (
     (r"^bottleneck\.", "bottle."),

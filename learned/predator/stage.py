@@ -48,8 +48,8 @@ class PredatorOverlap(_PredatorStage):
     """
 
     def __call__(self, scene: Scene) -> Overlap:
-        from hybridreg.learned.stages.arrays import array
         from hybridreg.learned.stages.spreading import spread
+        from hybridreg.learned.stages.tensor_values import array
 
         output = self.output(scene)
         source, target = (
@@ -90,8 +90,8 @@ class Predator(_PredatorStage):
             raise ValueError(f"seed={self.seed} must not be negative")
 
     def __call__(self, scene: Scene, overlap: Overlap) -> Correspondences:
-        from hybridreg.learned.stages.arrays import array
         from hybridreg.learned.stages.dense_matching import DensePoints, match_points
+        from hybridreg.learned.stages.tensor_values import array
 
         output = self.output(scene)
         sides = (
@@ -106,9 +106,9 @@ class Predator(_PredatorStage):
         return match_points(clouds[0], clouds[1], mutual=self.mutual, spacing=spacing)
 
     def _rows(self, cloud: PredatorCloud, level: Level, given: Array, number: int) -> NDArray[np.int64]:
-        from hybridreg.learned.stages.arrays import array
         from hybridreg.learned.stages.drawing import draw
         from hybridreg.learned.stages.spreading import gather
+        from hybridreg.learned.stages.tensor_values import array
 
         own, saliency, points = array(cloud.overlap), array(cloud.saliency), array(cloud.points)
         # A mask that is one everywhere says nothing.

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
-from hybridreg.learned.neighbors import pairs_within
+from hybridreg.learned.matching.procrustes import apply_transform
 from hybridreg.learned.predator.config import PredatorConfig, PredatorLossConfig
-from hybridreg.learned.procrustes import apply_transform
-from hybridreg.learned.pyramid import Pyramid
+from hybridreg.learned.pyramid.neighbors import pairs_within
+from hybridreg.learned.pyramid.point_pyramid import Pyramid
 
 
 @dataclass(frozen=True, kw_only=True)

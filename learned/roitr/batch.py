@@ -10,7 +10,7 @@ import numpy.typing as npt
 import torch
 
 from hybridreg.learned.roitr.config import RoitrConfig
-from hybridreg.learned.roitr.levels import Levels, build_levels
+from hybridreg.learned.roitr.point_levels import Levels, build_levels
 from hybridreg.normals import estimate
 
 

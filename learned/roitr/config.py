@@ -8,9 +8,9 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
-from hybridreg import limits
-from hybridreg.learned.config import LossConfig, MatchingConfig, TransformerConfig
-from hybridreg.plain_values import build
+from hybridreg.config import limits
+from hybridreg.config.plain_values import build
+from hybridreg.learned.cross3dreg.config import LossConfig, MatchingConfig, TransformerConfig
 
 _WIDEST, _MOST_NEIGHBORS, _MOST_BLOCKS = 4096, 512, 64
 

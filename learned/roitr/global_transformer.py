@@ -8,9 +8,9 @@ import math
 import torch
 from torch import Tensor, nn
 
-from hybridreg.learned.attention import Attention, FeedForward, merge_heads, split_heads
-from hybridreg.learned.config import TransformerConfig
-from hybridreg.learned.structure_embedding import StructureEmbedding
+from hybridreg.learned.cross3dreg.config import TransformerConfig
+from hybridreg.learned.geotransformer.structure_embedding import StructureEmbedding
+from hybridreg.learned.layers.attention import Attention, FeedForward, merge_heads, split_heads
 
 
 class TwoBranchAttention(Attention):

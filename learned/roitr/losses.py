@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 import torch
 from torch import Tensor
 
-from hybridreg.learned.circle_loss import circle_loss
-from hybridreg.learned.fine_loss import assignment_loss
-from hybridreg.learned.procrustes import apply_transform
+from hybridreg.learned.losses.circle_loss import circle_loss
+from hybridreg.learned.losses.fine_loss import assignment_loss
+from hybridreg.learned.matching.procrustes import apply_transform
 from hybridreg.learned.roitr.targets import RoitrTargets
 
 if TYPE_CHECKING:

@@ -3,10 +3,10 @@
 
 from __future__ import annotations
 
-from hybridreg.learned.memory import SLACK
+from hybridreg.learned.memory_estimate import SLACK
 from hybridreg.learned.roitr.batch import RoitrBatch
 from hybridreg.learned.roitr.config import RoitrConfig
-from hybridreg.learned.roitr.levels import Levels
+from hybridreg.learned.roitr.point_levels import Levels
 
 _FLOAT = 4
 _GATHERED = 3  # of (neighbours, C) tensors alive at a time: keys or values, their product, one temporary

@@ -11,26 +11,26 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional as F
 
-from hybridreg.learned.blocks import pad_row
 from hybridreg.learned.checkpoints import read_checkpoint
-from hybridreg.learned.encodings import CloudEncoding
-from hybridreg.learned.patch_pairs import PatchPairs, pair_patches, size_chunks
-from hybridreg.learned.patches import build_patches
-from hybridreg.learned.point_matching import PointMatches, gather_matches
+from hybridreg.learned.cross3dreg.encodings import CloudEncoding
+from hybridreg.learned.layers.kpconv_blocks import pad_row
+from hybridreg.learned.matching.patch_pairs import PatchPairs, pair_patches, size_chunks
+from hybridreg.learned.matching.point_matching import PointMatches, gather_matches
+from hybridreg.learned.matching.sinkhorn import OptimalTransport
+from hybridreg.learned.matching.superpoint_matching import SuperpointMatches, match_superpoints
 from hybridreg.learned.pretrained import Pretrained
-from hybridreg.learned.roitr.backbone import RoitrBackbone
+from hybridreg.learned.pyramid.patches import build_patches
 from hybridreg.learned.roitr.batch import RoitrBatch
 from hybridreg.learned.roitr.config import SIZES, RoitrConfig, named_config
+from hybridreg.learned.roitr.encoder_decoder import RoitrBackbone
 from hybridreg.learned.roitr.examples import example
 from hybridreg.learned.roitr.global_transformer import GlobalTransformer
-from hybridreg.learned.roitr.levels import Levels
 from hybridreg.learned.roitr.losses import RoitrLosses, losses
-from hybridreg.learned.roitr.matching import match_adaptively
 from hybridreg.learned.roitr.memory import forward_bytes
 from hybridreg.learned.roitr.official_names import official_name, unused_names
+from hybridreg.learned.roitr.point_levels import Levels
+from hybridreg.learned.roitr.superpoint_pairs import match_adaptively
 from hybridreg.learned.roitr.targets import RoitrTargets
-from hybridreg.learned.sinkhorn import OptimalTransport
-from hybridreg.learned.superpoint_matching import SuperpointMatches, match_superpoints
 from hybridreg.learned.weights import load_official_tensors
 
 

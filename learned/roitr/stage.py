@@ -17,7 +17,7 @@ from hybridreg.scene import Level, Scene
 if TYPE_CHECKING:
     from torch import Tensor
 
-    from hybridreg.learned.encodings import CloudEncoding
+    from hybridreg.learned.cross3dreg.encodings import CloudEncoding
     from hybridreg.learned.roitr.network import RoitrNetwork
 
 Array = NDArray[np.float64]
@@ -53,9 +53,9 @@ class Roitr(NetworkStage):
     def __call__(self, scene: Scene, overlap: Overlap) -> Correspondences:
         import torch
 
-        from hybridreg.learned.memory import require_bytes
+        from hybridreg.learned.memory_estimate import require_bytes
         from hybridreg.learned.roitr.batch import make_batch
-        from hybridreg.learned.stages.arrays import array
+        from hybridreg.learned.stages.tensor_values import array
 
         network: RoitrNetwork = self.network()
         self.note_random(scene)
@@ -86,8 +86,8 @@ class Roitr(NetworkStage):
     def _kept(self, probability: Array, level: Level, cloud: CloudEncoding) -> Tensor:
         import torch
 
-        from hybridreg.learned.stages.arrays import array
         from hybridreg.learned.stages.spreading import gather
+        from hybridreg.learned.stages.tensor_values import array
 
         mask = gather(probability, level.points, array(cloud.nodes)) > self.min_overlap
         kept = torch.from_numpy(mask).to(cloud.nodes.device) & cloud.patches.occupied

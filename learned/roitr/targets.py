@@ -8,12 +8,12 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
-from hybridreg.learned.neighbors import radius_neighbors
-from hybridreg.learned.patches import Patches, build_patches
-from hybridreg.learned.procrustes import apply_transform
+from hybridreg.learned.cross3dreg.targets import node_overlaps
+from hybridreg.learned.matching.procrustes import apply_transform
+from hybridreg.learned.pyramid.neighbors import radius_neighbors
+from hybridreg.learned.pyramid.patches import Patches, build_patches
 from hybridreg.learned.roitr.batch import RoitrBatch
 from hybridreg.learned.roitr.config import RoitrConfig
-from hybridreg.learned.targets import node_overlaps
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -36,8 +36,8 @@ class DenseFeatures(NetworkStage):
             raise ValueError(f"min_overlap={self.min_overlap} must lie in [0, 1]")
 
     def __call__(self, scene: Scene, overlap: Overlap) -> Correspondences:
-        from hybridreg.learned.stages.arrays import array
         from hybridreg.learned.stages.encoding import encode
+        from hybridreg.learned.stages.tensor_values import array
 
         encoding = encode(scene, self)
         source, target = (

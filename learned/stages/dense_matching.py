@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from hybridreg.classical.nearest import nearest
+from hybridreg.geometry.nearest_descriptors import nearest
 from hybridreg.learned.stages.spreading import gather
 from hybridreg.matches import Correspondences, Overlap
 from hybridreg.scene import Scene

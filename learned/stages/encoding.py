@@ -7,17 +7,17 @@ from typing import TYPE_CHECKING
 
 import torch
 
-from hybridreg.learned.batch import Batch, make_batch
-from hybridreg.learned.encodings import Encoding
-from hybridreg.learned.memory import require_memory
+from hybridreg.learned.cross3dreg.batch import Batch, make_batch
+from hybridreg.learned.cross3dreg.encodings import Encoding
+from hybridreg.learned.memory_estimate import require_memory
 from hybridreg.learned.stages.levelling import Turns, likeness
 from hybridreg.learned.stages.network_grid import note_grid
 from hybridreg.learned.stages.network_stage import NetworkStage
+from hybridreg.runtime.threads import single
 from hybridreg.scene import Scene
-from hybridreg.threads import single
 
 if TYPE_CHECKING:
-    from hybridreg.learned.network import RegistrationNetwork
+    from hybridreg.learned.cross3dreg.network import RegistrationNetwork
 
 
 def encode(scene: Scene, stage: NetworkStage) -> Encoding:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from hybridreg.learned.stages.network_matcher import NetworkMatcher
 
 if TYPE_CHECKING:
-    from hybridreg.learned.network import RegistrationNetwork
+    from hybridreg.learned.cross3dreg.network import RegistrationNetwork
 
 
 @dataclass(frozen=True, kw_only=True)

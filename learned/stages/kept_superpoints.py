@@ -10,11 +10,11 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from hybridreg.learned.config import NetworkConfig, OmpConfig
-from hybridreg.learned.encodings import CloudEncoding, Encoding
-from hybridreg.learned.stages.arrays import array
+from hybridreg.learned.cross3dreg.config import NetworkConfig, OmpConfig
+from hybridreg.learned.cross3dreg.encodings import CloudEncoding, Encoding
+from hybridreg.learned.cross3dreg.superpoint_mask import Kept, choose
 from hybridreg.learned.stages.spreading import gather
-from hybridreg.learned.superpoint_mask import Kept, choose
+from hybridreg.learned.stages.tensor_values import array
 from hybridreg.matches import Overlap
 from hybridreg.scene import Level, Scene
 

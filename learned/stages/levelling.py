@@ -10,9 +10,9 @@ import torch
 from numpy.typing import NDArray
 from torch.nn import functional as F
 
-from hybridreg import ground
-from hybridreg.learned.encodings import CloudEncoding, Encoding
-from hybridreg.learned.superpoint_evidence import partners
+from hybridreg.geometry import ground
+from hybridreg.learned.cross3dreg.encodings import CloudEncoding, Encoding
+from hybridreg.learned.cross3dreg.superpoint_evidence import partners
 from hybridreg.scene import Scene
 
 Array = NDArray[np.float64]

@@ -9,17 +9,17 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from hybridreg import se3
-from hybridreg.classical.consensus import Consensus
-from hybridreg.classical.rivals import modes, same
+from hybridreg.classical.pose_modes import modes, same
 from hybridreg.classical.svd import kabsch
+from hybridreg.geometry import se3
+from hybridreg.geometry.consensus import Consensus
 from hybridreg.matches import Correspondences, Pose
+from hybridreg.runtime.threads import single
 from hybridreg.scene import Scene
 from hybridreg.stage import Stage
-from hybridreg.threads import single
 
 if TYPE_CHECKING:
-    from hybridreg.learned.lgr import LgrEstimate
+    from hybridreg.learned.matching.local_to_global import LgrEstimate
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.int64]
@@ -94,8 +94,8 @@ class Lgr(Stage):
     ) -> LgrEstimate:
         import torch
 
-        from hybridreg.learned.config import LgrConfig
-        from hybridreg.learned.lgr import local_to_global
+        from hybridreg.learned.cross3dreg.config import LgrConfig
+        from hybridreg.learned.matching.local_to_global import local_to_global
 
         if matches.group is None:
             raise ValueError(

@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, ClassVar
 
 from hybridreg.learned.stages.network_stage import NetworkStage
 from hybridreg.matches import Correspondences, Overlap
+from hybridreg.runtime.threads import single
 from hybridreg.scene import Scene
-from hybridreg.threads import single
 
 if TYPE_CHECKING:
-    from hybridreg.learned.network import RegistrationNetwork
-    from hybridreg.learned.point_matching import PointMatches
+    from hybridreg.learned.cross3dreg.network import RegistrationNetwork
+    from hybridreg.learned.matching.point_matching import PointMatches
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -57,7 +57,7 @@ class NetworkMatcher(NetworkStage):
 
 
 def _correspondences(matches: PointMatches, network: RegistrationNetwork) -> Correspondences:
-    from hybridreg.learned.stages.arrays import array
+    from hybridreg.learned.stages.tensor_values import array
 
     return Correspondences(
         source=array(matches.source),

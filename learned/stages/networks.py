@@ -13,7 +13,7 @@ from hybridreg.learned.checkpoints import is_checkpoint
 from hybridreg.learned.network_table import network_class
 from hybridreg.learned.pretrained import Pretrained
 from hybridreg.learned.weights import find_files
-from hybridreg.threads import single
+from hybridreg.runtime.threads import single
 
 _DEFAULT_SIZE = "nano"
 # Networks held at a time: OMP and a matcher of other weights, each beside the one before it.

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, ClassVar
 
 from hybridreg.learned.stages.network_stage import NetworkStage
 from hybridreg.matches import Overlap
+from hybridreg.runtime.threads import single
 from hybridreg.scene import Scene
-from hybridreg.threads import single
 
 if TYPE_CHECKING:
-    from hybridreg.learned.network import RegistrationNetwork
+    from hybridreg.learned.cross3dreg.network import RegistrationNetwork
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -30,9 +30,9 @@ class Omp(NetworkStage):
     def __call__(self, scene: Scene) -> Overlap:
         import torch
 
-        from hybridreg.learned.stages.arrays import array
         from hybridreg.learned.stages.encoding import encode
         from hybridreg.learned.stages.spreading import spread
+        from hybridreg.learned.stages.tensor_values import array
 
         network: RegistrationNetwork = self.network()
         encoding = encode(scene, self)

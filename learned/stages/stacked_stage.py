@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from hybridreg.learned.stages.network_stage import NetworkStage
 
 if TYPE_CHECKING:
-    from hybridreg.learned.batch import Batch
+    from hybridreg.learned.cross3dreg.batch import Batch
     from hybridreg.scene import Scene
 
 
@@ -21,8 +21,8 @@ class StackedStage(NetworkStage):
 
     def batch(self, scene: Scene) -> Batch:
         """The pair as the network sees it; what would not fit into memory is refused."""
-        from hybridreg.learned.batch import make_batch
-        from hybridreg.learned.memory import require_bytes
+        from hybridreg.learned.cross3dreg.batch import make_batch
+        from hybridreg.learned.memory_estimate import require_bytes
         from hybridreg.learned.stages.network_grid import note_grid
 
         network: Any = self.network()

@@ -16,8 +16,8 @@ from hybridreg.data.dataset import fingerprint_of
 from hybridreg.io.atomic import write_text
 from hybridreg.learned.network_table import DEFAULT
 from hybridreg.learned.training.checkpoint import Progress
-from hybridreg.learned.training.log import CurveFile
-from hybridreg.learned.training.opened_source import OpenedSource
+from hybridreg.learned.training.curve_files import CurveFile
+from hybridreg.learned.training.data.opened_source import OpenedSource
 from hybridreg.learned.training.recipe import Recipe
 from hybridreg.learned.training.stage_validation import estimator_of
 

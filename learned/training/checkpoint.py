@@ -14,8 +14,8 @@ import torch
 
 from hybridreg import __version__
 from hybridreg.io.atomic import write_bytes
-from hybridreg.io.files import read_whole
-from hybridreg.io.torch_file import parse_torch
+from hybridreg.io.formats.torch_file import parse_torch
+from hybridreg.io.whole_files import read_whole
 
 _FORMAT = 1
 

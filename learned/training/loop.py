@@ -13,22 +13,22 @@ import numpy as np
 import torch
 from torch import nn
 
-from hybridreg.learned.network import RegistrationNetwork
+from hybridreg.learned.cross3dreg.network import RegistrationNetwork
+from hybridreg.learned.cross3dreg.training_mask import MaskJitter
 from hybridreg.learned.pretrained import Pretrained
 from hybridreg.learned.training import checkpoint
 from hybridreg.learned.training.checkpoint import Progress
-from hybridreg.learned.training.examples import Example, learn
-from hybridreg.learned.training.frozen import FrozenFeatures, lasting
+from hybridreg.learned.training.data.frozen import FrozenFeatures, lasting
+from hybridreg.learned.training.data.opened_source import OpenedSource
+from hybridreg.learned.training.data.order import Order
+from hybridreg.learned.training.data.samples import PhaseSamples, Sample, Unusable, stream
+from hybridreg.learned.training.data.training_examples import Example, learn
 from hybridreg.learned.training.gradients import StepOutcome, finish_step
 from hybridreg.learned.training.objective import Outcome, objective
-from hybridreg.learned.training.opened_source import OpenedSource
-from hybridreg.learned.training.order import Order
 from hybridreg.learned.training.recipe import Phase, Recipe
 from hybridreg.learned.training.record import Record
-from hybridreg.learned.training.samples import PhaseSamples, Sample, Unusable, stream
 from hybridreg.learned.training.schedule import make_optimizer, rate_at, set_rate, steps_of, trainable
-from hybridreg.learned.training.stopping import StopFlag
-from hybridreg.learned.training_mask import MaskJitter
+from hybridreg.learned.training.stop_flag import StopFlag
 
 if TYPE_CHECKING:
     from lightning_fabric import Fabric

@@ -8,16 +8,16 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
-from hybridreg.learned.circle_loss import circle_loss
-from hybridreg.learned.encodings import Encoding, Known
-from hybridreg.learned.infonce_loss import InfoNceConfig, infonce
-from hybridreg.learned.losses import mask_loss, overlap_matrix
-from hybridreg.learned.network import RegistrationNetwork
-from hybridreg.learned.superpoint_mask import Kept
+from hybridreg.learned.cross3dreg.encodings import Encoding, Known
+from hybridreg.learned.cross3dreg.losses import mask_loss, overlap_matrix
+from hybridreg.learned.cross3dreg.network import RegistrationNetwork
+from hybridreg.learned.cross3dreg.superpoint_mask import Kept
+from hybridreg.learned.cross3dreg.training_mask import MaskJitter
+from hybridreg.learned.cross3dreg.training_step import fine_loss, keep_for_training
+from hybridreg.learned.losses.circle_loss import circle_loss
+from hybridreg.learned.losses.infonce_loss import InfoNceConfig, infonce
+from hybridreg.learned.training.data.samples import Sample
 from hybridreg.learned.training.recipe import LossWeights
-from hybridreg.learned.training.samples import Sample
-from hybridreg.learned.training_mask import MaskJitter
-from hybridreg.learned.training_step import fine_loss, keep_for_training
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -7,9 +7,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
-from hybridreg.learned.infonce_loss import InfoNceConfig
+from hybridreg.learned.losses.infonce_loss import InfoNceConfig
 from hybridreg.learned.network_table import DEFAULT, network_class
-from hybridreg.learned.training.augmentation import Augmentation
+from hybridreg.learned.training.data.augmentation import Augmentation
 
 
 @dataclass(frozen=True, kw_only=True)

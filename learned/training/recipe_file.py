@@ -9,13 +9,13 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from hybridreg.config.plain_values import build, value_of
 from hybridreg.io.structured import read_toml
 from hybridreg.learned import recipes
-from hybridreg.learned.config import NetworkConfig
+from hybridreg.learned.cross3dreg.config import NetworkConfig
+from hybridreg.learned.cross3dreg.sizes import named_config
 from hybridreg.learned.network_table import DEFAULT
-from hybridreg.learned.sizes import named_config
 from hybridreg.learned.training.recipe import Phase, Recipe
-from hybridreg.plain_values import build, value_of
 
 _NETWORK_KEYS = {"size": "small", "omp": True, "vgam": True}
 

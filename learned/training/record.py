@@ -12,17 +12,17 @@ from pathlib import Path
 import torch
 from torch import Tensor
 
-from hybridreg.learned.network import RegistrationNetwork
+from hybridreg.learned.cross3dreg.network import RegistrationNetwork
+from hybridreg.learned.matching.procrustes import apply_transform
 from hybridreg.learned.pretrained import Pretrained
-from hybridreg.learned.procrustes import apply_transform
 from hybridreg.learned.training.checkpoint import Progress
-from hybridreg.learned.training.examples import Example
-from hybridreg.learned.training.log import CurveFile, Value
+from hybridreg.learned.training.curve_files import CurveFile, Value
+from hybridreg.learned.training.data.opened_source import OpenedSource
+from hybridreg.learned.training.data.samples import Sample
+from hybridreg.learned.training.data.training_examples import Example
 from hybridreg.learned.training.objective import Outcome
-from hybridreg.learned.training.opened_source import OpenedSource
 from hybridreg.learned.training.recipe import Phase
 from hybridreg.learned.training.reporting import Reporter
-from hybridreg.learned.training.samples import Sample
 from hybridreg.learned.training.validation import PROTOCOL, Validation, pair_inlier_ratio, rank, validate
 from hybridreg.learned.weights import save_pretrained
 

@@ -12,9 +12,9 @@ import torch
 from hybridreg import registry
 from hybridreg.classical.sampling import AllPoints
 from hybridreg.classical.voxel import VoxelGrid
-from hybridreg.eval import metrics
-from hybridreg.eval.protocols import Protocol
-from hybridreg.eval.row import Row, matrix
+from hybridreg.eval.run.row import Row, matrix
+from hybridreg.eval.score import metrics
+from hybridreg.eval.score.protocols import Protocol
 from hybridreg.frames import lower_pose
 from hybridreg.learned.pretrained import Pretrained
 from hybridreg.learned.stages.network_stage import NetworkStage

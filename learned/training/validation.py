@@ -11,19 +11,19 @@ import torch
 from torch import Tensor
 from torch.nn import functional as F
 
-from hybridreg.eval import metrics
-from hybridreg.eval.protocols import protocol
-from hybridreg.eval.row import Row, matrix
-from hybridreg.eval.scoring import score
-from hybridreg.learned.lgr import local_to_global
-from hybridreg.learned.network import RegistrationNetwork
+from hybridreg.eval.run.row import Row, matrix
+from hybridreg.eval.score import metrics
+from hybridreg.eval.score.protocols import protocol
+from hybridreg.eval.score.scoring import score
+from hybridreg.learned.cross3dreg.network import RegistrationNetwork
+from hybridreg.learned.cross3dreg.targets import Targets
+from hybridreg.learned.matching.local_to_global import local_to_global
+from hybridreg.learned.matching.superpoint_matching import SuperpointMatches
 from hybridreg.learned.pretrained import Pretrained
-from hybridreg.learned.superpoint_matching import SuperpointMatches
-from hybridreg.learned.targets import Targets
+from hybridreg.learned.training.data.opened_source import OpenedSource
+from hybridreg.learned.training.data.pair_source import PairSource
+from hybridreg.learned.training.data.samples import Sample, undisturbed
 from hybridreg.learned.training.objective import fine_features
-from hybridreg.learned.training.opened_source import OpenedSource
-from hybridreg.learned.training.pair_source import PairSource
-from hybridreg.learned.training.samples import Sample, undisturbed
 from hybridreg.learned.training.stage_validation import rows_of
 
 PROTOCOL = protocol("cross3dreg")

@@ -11,7 +11,7 @@ import torch
 from torch import Tensor
 
 from hybridreg.learned.vrhcf.config import SphereNetConfig
-from hybridreg.learned.vrhcf.patches import build_patches
+from hybridreg.learned.vrhcf.keypoint_patches import build_patches
 
 
 @dataclass(frozen=True, kw_only=True)

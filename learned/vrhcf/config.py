@@ -8,8 +8,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
-from hybridreg import limits
-from hybridreg.plain_values import build
+from hybridreg.config import limits
+from hybridreg.config.plain_values import build
 
 _WIDEST, _MOST_CELLS, _MOST_POINTS = 4096, 512, 100_000
 
@@ -71,7 +71,7 @@ class SphereNetConfig:
         the cross product there names no dimension. "right": every patch its own.
     ``matching``
         "channels" (released): descriptors are divided by the length of each *channel* over all keypoints
-        (module/HCF_module.py). "unit": by their own length. See `hybridreg.learned.vrhcf.matching`.
+        (module/HCF_module.py). "unit": by their own length. See `hybridreg.learned.vrhcf.keypoint_matching`.
     ``facing``
         "origin" (released): axes face the origin of each cloud's frame, so that a cloud whose frame was moved has other
         descriptors. "sensor": they face the place that the cloud was seen from, and upwards where that is not known.

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from hybridreg.learned.memory import SLACK
+from hybridreg.learned.memory_estimate import SLACK
 from hybridreg.learned.vrhcf.config import SphereNetConfig
 
 _FLOAT = 4

@@ -9,8 +9,8 @@ from hybridreg.classical.voxel import voxel_centroids
 from hybridreg.learned.true_pair import TruePair
 from hybridreg.learned.vrhcf.batch import SphereBatch
 from hybridreg.learned.vrhcf.config import SphereNetConfig
-from hybridreg.learned.vrhcf.frames import place
 from hybridreg.learned.vrhcf.targets import SphereTargets, training_batch
+from hybridreg.learned.vrhcf.upright_frames import place
 
 
 def example(

@@ -18,11 +18,11 @@ from hybridreg.learned.vrhcf.batch import SphereBatch
 from hybridreg.learned.vrhcf.config import SIZES, ShellConv, SphereNetConfig, SurfaceConv, named_config
 from hybridreg.learned.vrhcf.cost import CHUNK, forward_bytes
 from hybridreg.learned.vrhcf.examples import example
-from hybridreg.learned.vrhcf.frames import reference_axes, upright_rotations
 from hybridreg.learned.vrhcf.losses import SphereLosses, losses
 from hybridreg.learned.vrhcf.official_names import UNUSED, official_names
+from hybridreg.learned.vrhcf.spherical_voxels import counts, spherical, voxels
 from hybridreg.learned.vrhcf.targets import SphereTargets
-from hybridreg.learned.vrhcf.voxels import counts, spherical, voxels
+from hybridreg.learned.vrhcf.upright_frames import reference_axes, upright_rotations
 from hybridreg.learned.weights import load_official_tensors
 
 

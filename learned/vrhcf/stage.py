@@ -44,7 +44,7 @@ class Vrhcf(NetworkStage):
         Of a cloud, drawn at random; None as above.
     matching : "channels", "unit" or None
         How descriptors are normalised: None as the network's configuration says, "channels" for official weights, as
-        released; "unit" is the right one (`hybridreg.learned.vrhcf.matching`).
+        released; "unit" is the right one (`hybridreg.learned.vrhcf.keypoint_matching`).
     mutual : bool
         Keep only matches that are nearest both ways; published is without, so that each keypoint has a match.
     """
@@ -72,11 +72,11 @@ class Vrhcf(NetworkStage):
     def __call__(self, scene: Scene, overlap: Overlap) -> Correspondences:
         import torch
 
-        from hybridreg.learned.memory import require_bytes
-        from hybridreg.learned.stages.arrays import array
+        from hybridreg.learned.memory_estimate import require_bytes
+        from hybridreg.learned.stages.tensor_values import array
         from hybridreg.learned.vrhcf.batch import make_batch
-        from hybridreg.learned.vrhcf.frames import place
-        from hybridreg.learned.vrhcf.matching import match_descriptors
+        from hybridreg.learned.vrhcf.keypoint_matching import match_descriptors
+        from hybridreg.learned.vrhcf.upright_frames import place
 
         network: SphereNet = self.network()
         self.note_random(scene)

@@ -6,10 +6,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.calibration import draw, line, table, wilson
-from hybridreg import se3
-from hybridreg.eval.row import Row
-from hybridreg.eval.store import Appender
+from hybridreg.eval.run.row import Row
+from hybridreg.eval.run.store import Appender
+from hybridreg.geometry import se3
+from hybridreg.verdict.training.calibration import draw, line, table, wilson
 
 OFF = se3.yaw(10.0)
 

@@ -6,10 +6,10 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.reach import outcomes, table
-from hybridreg import se3
 from hybridreg.data import open_dataset
-from hybridreg.eval.row import Row
-from hybridreg.eval.store import Appender
+from hybridreg.eval.run.row import Row
+from hybridreg.eval.run.store import Appender
+from hybridreg.geometry import se3
 
 DATA = "sim:train/mid#2"
 

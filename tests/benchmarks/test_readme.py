@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks.readme import insert
+from tools.readme import insert
 
 ROOT = Path(__file__).resolve().parents[2]
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hybridreg import se3
+from hybridreg.geometry import se3
 from hybridreg.matches import Correspondences
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import pytest
 
-from hybridreg._open3d import load_open3d
+from hybridreg.runtime.open3d import load_open3d
 
 
 def open3d_loads() -> bool:

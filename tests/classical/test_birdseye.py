@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from made_street import block, pose, seen, two_views
 
 import hybridreg as hr
-from hybridreg import se3
+from hybridreg.geometry import se3
 from hybridreg.matches import Correspondences
 from hybridreg.testing import check_stage
 

@@ -11,8 +11,8 @@ import pytest
 
 import hybridreg as hr
 import hybridreg.data
-from hybridreg import se3
-from hybridreg.data.folder import load_pair
+from hybridreg.data.loaders.folder import load_pair
+from hybridreg.geometry import se3
 from hybridreg.testing import check_stage, sample_scene
 from hybridreg.verdict import weigh
 

@@ -5,10 +5,10 @@ import numpy as np
 import pytest
 from made_matches import planted, random_pose
 
-from hybridreg import se3
 from hybridreg.classical import hypotheses
-from hybridreg.classical.consensus import Consensus, distances
-from hybridreg.classical.rivals import modes
+from hybridreg.classical.pose_modes import modes
+from hybridreg.geometry import se3
+from hybridreg.geometry.consensus import Consensus, distances
 from hybridreg.matches import Correspondences
 
 

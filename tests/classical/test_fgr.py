@@ -11,8 +11,8 @@ import pytest
 from made_matches import planted
 from needs_open3d import needs_open3d
 
-from hybridreg import se3
 from hybridreg.classical.fgr import Fgr
+from hybridreg.geometry import se3
 from hybridreg.matches import Correspondences
 from hybridreg.scene import Scene
 from hybridreg.testing import check_stage

@@ -13,9 +13,9 @@ from made_matches import street
 from needs_open3d import needs_open3d
 
 import hybridreg as hr
-from hybridreg import se3
 from hybridreg.classical.fpfh import Fpfh
 from hybridreg.classical.ransac import Ransac
+from hybridreg.geometry import se3
 from hybridreg.matches import Correspondences, Overlap
 from hybridreg.scene import Scene
 from hybridreg.testing import check_stage

@@ -5,10 +5,10 @@ import numpy as np
 import pytest
 from made_matches import planted
 
-from hybridreg import se3
 from hybridreg.classical.compatibility import first_order, leading_eigenvectors, pick_seeds, second_order
 from hybridreg.classical.consensus_sets import filter_sets, first_sets, set_poses, set_weights
 from hybridreg.classical.hcf import Hcf
+from hybridreg.geometry import se3
 from hybridreg.matches import Correspondences, Pose
 from hybridreg.scene import Scene
 from hybridreg.testing import check_stage

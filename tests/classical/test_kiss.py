@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 import hybridreg as hr
-from hybridreg import se3, testing
+from hybridreg import testing
+from hybridreg.geometry import se3
 from hybridreg.matches import Correspondences
 from hybridreg.scene import Scene
 

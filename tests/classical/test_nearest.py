@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.distance import cdist
 
-from hybridreg.classical.nearest import nearest
+from hybridreg.geometry.nearest_descriptors import nearest
 
 
 @settings(max_examples=40)

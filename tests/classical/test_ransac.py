@@ -12,8 +12,8 @@ import pytest
 from made_matches import planted, random_pose
 from needs_open3d import needs_open3d
 
-from hybridreg import se3
 from hybridreg.classical.ransac import Ransac
+from hybridreg.geometry import se3
 from hybridreg.matches import Correspondences, Pose
 from hybridreg.scene import Scene
 from hybridreg.testing import check_stage

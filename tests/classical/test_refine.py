@@ -11,8 +11,8 @@ import pytest
 import small_gicp
 
 import hybridreg as hr
-from hybridreg import se3
 from hybridreg.classical.icp import plane_step, point_step
+from hybridreg.geometry import se3
 from hybridreg.matches import Pose
 from hybridreg.scene import Scene
 

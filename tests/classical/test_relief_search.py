@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import hybridreg as hr
-from hybridreg import se3
+from hybridreg.geometry import se3
 from hybridreg.matches import Correspondences
 from hybridreg.testing import check_stage
 from tests.made_fields import field_pair

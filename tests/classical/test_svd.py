@@ -7,8 +7,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from made_matches import planted, random_pose
 
-from hybridreg import se3
 from hybridreg.classical.svd import STATUSES, WeightedSvd, kabsch, kabsch_batch
+from hybridreg.geometry import se3
 from hybridreg.matches import Correspondences
 
 

@@ -3,8 +3,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from hybridreg.classical.columns import Columns, FromAbove
-from hybridreg.classical.sweep import Planar, sweep
+from hybridreg.classical.overhead.overhead_columns import Columns, FromAbove
+from hybridreg.classical.overhead.sweep import Planar, sweep
 
 # Along a corridor: walls on both sides without an end in sight, and a few short things at odd places.
 THINGS = np.array([-21.0 + 2.6j, -12.5 - 2.4j, -3.0 + 1.0j, 6.5 - 2.6j, 9.0 + 2.5j, 20.0 + 0.5j])

@@ -9,10 +9,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from hybridreg import ground, se3
 from hybridreg.classical.visibility import Visibility
 from hybridreg.classical.voxel import VoxelGrid
 from hybridreg.cloud import PointCloud
+from hybridreg.geometry import ground, se3
 from hybridreg.pair import Pair
 from hybridreg.scene import Scene
 

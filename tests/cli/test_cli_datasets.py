@@ -10,10 +10,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hybridreg import se3
 from hybridreg.cli import main
 from hybridreg.data import open_dataset
 from hybridreg.data.summary import summarise
+from hybridreg.geometry import se3
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "data"))
 import loader_trees

@@ -13,8 +13,8 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks.hostile import killed
 from hybridreg.eval import read
+from tools.hostile import killed_batch
 
 ROOT = Path(__file__).resolve().parents[2]
 LONGEST = 90.0
@@ -34,7 +34,7 @@ refine = "icp"
 
 @pytest.fixture
 def batch(tmp_path: Path) -> Path:
-    killed.write_data(tmp_path / "data", PAIRS)
+    killed_batch.write_data(tmp_path / "data", PAIRS)
     (tmp_path / "table.toml").write_text(SLOW)
     return tmp_path
 
@@ -163,7 +163,7 @@ def test_a_second_table_in_the_folder_is_refused(batch: Path) -> None:
 @pytest.fixture(scope="module")
 def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
     root = tmp_path_factory.mktemp("finished")
-    killed.write_data(root / "data", 2)
+    killed_batch.write_data(root / "data", 2)
     (root / "table.toml").write_text(SLOW, encoding="utf-8")
     process = start(root, *TABLE)
     _, told = process.communicate(timeout=LONGEST)

@@ -14,12 +14,10 @@ from torch import Tensor
 from hybridreg.learned.cofinet.config import CofinetConfig, SelectionConfig
 from hybridreg.learned.cofinet.losses import cofinet_losses
 from hybridreg.learned.cofinet.patching import PatchIndex
+from hybridreg.learned.cofinet.point_transport import alternating_sinkhorn, either_best
 from hybridreg.learned.cofinet.selection import select
-from hybridreg.learned.cofinet.targets import (
-    CofinetTargets,
-)
-from hybridreg.learned.cofinet.transport import alternating_sinkhorn, either_best
-from hybridreg.learned.sinkhorn import log_sinkhorn
+from hybridreg.learned.cofinet.targets import CofinetTargets
+from hybridreg.learned.matching.sinkhorn import log_sinkhorn
 
 LOSS = 1e-4
 

@@ -12,13 +12,13 @@ from arrays import Found, apart
 from stacked import FEATURES
 from torch import Tensor
 
-from hybridreg.learned.cofinet.attention import scores
 from hybridreg.learned.cofinet.network import CofinetEncoding, CofinetNetwork
 from hybridreg.learned.cofinet.patching import PatchIndex, patch_index
+from hybridreg.learned.cofinet.point_transport import MASKED
 from hybridreg.learned.cofinet.selection import NodePairs, select
-from hybridreg.learned.cofinet.transport import MASKED
-from hybridreg.learned.distances import squared_distances
-from hybridreg.learned.patches import build_patches
+from hybridreg.learned.cofinet.transformer import scores
+from hybridreg.learned.layers.distances import squared_distances
+from hybridreg.learned.pyramid.patches import build_patches
 
 LOSS = 1e-4
 # Below, an assignment is that of a place that no point fills: float32 has steps of 0.06 there.

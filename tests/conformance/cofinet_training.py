@@ -12,7 +12,6 @@ from cofinet_matching import patches_apart, recorded_patches, tied_matches
 from stacked import TIE, gradients_apart, norms_apart
 from torch import Tensor
 
-from hybridreg.learned.batch import Batch
 from hybridreg.learned.cofinet.config import CofinetConfig
 from hybridreg.learned.cofinet.network import CofinetNetwork
 from hybridreg.learned.cofinet.official_names import official_name
@@ -24,7 +23,8 @@ from hybridreg.learned.cofinet.targets import (
     true_pairs,
     with_pairs,
 )
-from hybridreg.learned.procrustes import apply_transform
+from hybridreg.learned.cross3dreg.batch import Batch
+from hybridreg.learned.matching.procrustes import apply_transform
 
 LOSS = 1e-4
 # Probabilities and weights this near to a threshold fall on either side of it.

@@ -13,17 +13,17 @@ from plan import Recording
 from scipy.spatial import cKDTree
 from torch import Tensor
 
-from hybridreg.learned.circle_loss import circle_loss
-from hybridreg.learned.distances import squared_distances
-from hybridreg.learned.fine_loss import assignment_loss
-from hybridreg.learned.lgr import local_to_global
-from hybridreg.learned.losses import overlap_matrix
-from hybridreg.learned.network import Output
-from hybridreg.learned.patches import build_patches
-from hybridreg.learned.point_matching import mutual_top_k
-from hybridreg.learned.procrustes import apply_transform
-from hybridreg.learned.superpoint_matching import SuperpointMatches, match_superpoints
-from hybridreg.learned.targets import Targets, compute_targets
+from hybridreg.learned.cross3dreg.losses import overlap_matrix
+from hybridreg.learned.cross3dreg.network import Output
+from hybridreg.learned.cross3dreg.targets import Targets, compute_targets
+from hybridreg.learned.layers.distances import squared_distances
+from hybridreg.learned.losses.circle_loss import circle_loss
+from hybridreg.learned.losses.fine_loss import assignment_loss
+from hybridreg.learned.matching.local_to_global import local_to_global
+from hybridreg.learned.matching.point_matching import mutual_top_k
+from hybridreg.learned.matching.procrustes import apply_transform
+from hybridreg.learned.matching.superpoint_matching import SuperpointMatches, match_superpoints
+from hybridreg.learned.pyramid.patches import build_patches
 
 # The log-assignment of a padded entry is minus infinity up to rounding: about -1e12, where neighbouring
 # float32 numbers are 65536 apart. Both sides must be below this; their difference means nothing.

@@ -12,8 +12,8 @@ import torch
 from arrays import read_arrays, read_plan, read_weights
 from torch import Tensor
 
-from hybridreg.learned.batch import Batch
-from hybridreg.learned.config import (
+from hybridreg.learned.cross3dreg.batch import Batch
+from hybridreg.learned.cross3dreg.config import (
     BackboneConfig,
     LgrConfig,
     LossConfig,
@@ -21,8 +21,8 @@ from hybridreg.learned.config import (
     NetworkConfig,
     TransformerConfig,
 )
-from hybridreg.learned.network import RegistrationNetwork
-from hybridreg.learned.pyramid import Pyramid
+from hybridreg.learned.cross3dreg.network import RegistrationNetwork
+from hybridreg.learned.pyramid.point_pyramid import Pyramid
 from hybridreg.learned.weights import load_official_tensors
 
 

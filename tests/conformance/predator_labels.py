@@ -13,9 +13,7 @@ from stacked import TIE
 from torch import Tensor
 
 from hybridreg.learned.predator.config import PredatorLossConfig
-from hybridreg.learned.predator.losses import (
-    matchable,
-)
+from hybridreg.learned.predator.losses import matchable
 from hybridreg.learned.predator.targets import PredatorTargets, candidates
 
 # Inner products of unit features that agree to some digits of float32: the best match may be either.

@@ -13,7 +13,8 @@ from predator_labels import Sides, drawn_apart, labels_apart, labels_unequal, ti
 from stacked import FEATURES, gradients_apart, norms_apart
 from torch import Tensor
 
-from hybridreg.learned.batch import Batch
+from hybridreg.learned.cross3dreg.batch import Batch
+from hybridreg.learned.matching.procrustes import apply_transform
 from hybridreg.learned.predator.config import PredatorLossConfig
 from hybridreg.learned.predator.losses import (
     PredatorLosses,
@@ -24,7 +25,6 @@ from hybridreg.learned.predator.losses import (
 from hybridreg.learned.predator.network import PredatorCloud, PredatorNetwork
 from hybridreg.learned.predator.official_names import official_name
 from hybridreg.learned.predator.targets import PredatorTargets
-from hybridreg.learned.procrustes import apply_transform
 
 LOSS = 1e-4
 

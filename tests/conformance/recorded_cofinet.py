@@ -22,11 +22,11 @@ from stacked import (
 )
 from torch import Tensor
 
-from hybridreg.learned.batch import Batch
-from hybridreg.learned.cofinet.attention import scores
 from hybridreg.learned.cofinet.config import CofinetConfig, CofinetLossConfig, SelectionConfig
 from hybridreg.learned.cofinet.network import CofinetEncoding, CofinetNetwork
 from hybridreg.learned.cofinet.official_names import UNUSED, official_name
+from hybridreg.learned.cofinet.transformer import scores
+from hybridreg.learned.cross3dreg.batch import Batch
 from hybridreg.learned.weights import load_official_tensors
 
 COARSE = 1e-3

@@ -34,7 +34,7 @@ from hybridreg.learned.fcgf.targets import FcgfTargets, positive_pairs
 from hybridreg.learned.layers.kernel_maps import kernel_offsets
 from hybridreg.learned.layers.sparse_conv import convolve
 from hybridreg.learned.layers.voxels import VoxelPyramid, quantise
-from hybridreg.learned.procrustes import apply_transform
+from hybridreg.learned.matching.procrustes import apply_transform
 from hybridreg.learned.weights import load_official_tensors
 
 FORWARD, TIE = 1e-4, 1e-5

@@ -9,7 +9,7 @@ from arrays import Found, complete
 from compare import differences, pairs_at_radius
 from plan import read_recording
 
-from hybridreg.learned.targets import compute_targets
+from hybridreg.learned.cross3dreg.targets import compute_targets
 
 TOLERANCE = 1e-4
 # Pairs of patches that may be forgiven for points at the radius: one in a hundred, or two.

@@ -22,9 +22,9 @@ from torch import Tensor
 from hybridreg.learned.omnet.batch import OmnetBatch
 from hybridreg.learned.omnet.config import OmnetConfig, OmnetLossConfig
 from hybridreg.learned.omnet.losses import omnet_losses, step_labels
-from hybridreg.learned.omnet.metrics import pose_errors
 from hybridreg.learned.omnet.network import OmnetNetwork, OmnetOutput, Step
 from hybridreg.learned.omnet.official_names import official_name
+from hybridreg.learned.omnet.published_errors import pose_errors
 from hybridreg.learned.omnet.quaternions import compose, matrix_of, multiply, pose_of, rotate
 from hybridreg.learned.omnet.targets import OmnetTargets, compute_targets
 from hybridreg.learned.weights import load_official_tensors

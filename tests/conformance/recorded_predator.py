@@ -21,7 +21,7 @@ from stacked import (
 )
 from torch import Tensor
 
-from hybridreg.learned.batch import Batch
+from hybridreg.learned.cross3dreg.batch import Batch
 from hybridreg.learned.predator.config import GraphConfig, PredatorConfig, PredatorLossConfig
 from hybridreg.learned.predator.graph import nearest_others
 from hybridreg.learned.predator.network import PredatorNetwork

@@ -14,11 +14,11 @@ from ties import Compared
 from torch import Tensor
 from torch.nn import functional as F
 
-from hybridreg.learned.attention import Attention, split_heads
-from hybridreg.learned.distances import squared_distances
-from hybridreg.learned.roitr.backbone import LevelFeatures
+from hybridreg.learned.geotransformer.structure_embedding import neighbor_angles
+from hybridreg.learned.layers.attention import Attention, split_heads
+from hybridreg.learned.layers.distances import squared_distances
+from hybridreg.learned.roitr.encoder_decoder import LevelFeatures
 from hybridreg.learned.roitr.global_transformer import TwoBranchAttention
-from hybridreg.learned.structure_embedding import neighbor_angles
 
 MODULE, CHAIN = 1e-4, 2e-3
 

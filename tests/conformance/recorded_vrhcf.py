@@ -15,12 +15,12 @@ from vrhcf_estimator import compare_estimator
 
 from hybridreg.learned.vrhcf.batch import SphereBatch
 from hybridreg.learned.vrhcf.config import ShellConv, SphereNetConfig, SurfaceConv
-from hybridreg.learned.vrhcf.frames import reference_axes, upright_rotations
+from hybridreg.learned.vrhcf.keypoint_matching import match_descriptors
 from hybridreg.learned.vrhcf.losses import SphereLosses, distances, hardest_in_batch
-from hybridreg.learned.vrhcf.matching import match_descriptors
 from hybridreg.learned.vrhcf.network import SphereNet
 from hybridreg.learned.vrhcf.official_names import UNUSED, official_names
-from hybridreg.learned.vrhcf.voxels import counts, spherical, voxels
+from hybridreg.learned.vrhcf.spherical_voxels import counts, spherical, voxels
+from hybridreg.learned.vrhcf.upright_frames import reference_axes, upright_rotations
 from hybridreg.learned.weights import load_official_tensors
 
 TOLERANCE = 1e-4

@@ -8,10 +8,10 @@ from roitr_plan import SIDES, RoitrRecording
 from ties import Compared
 from torch import Tensor
 
-from hybridreg.learned.distances import squared_distances
-from hybridreg.learned.patches import build_patches
-from hybridreg.learned.roitr.backbone import LevelFeatures
-from hybridreg.learned.roitr.levels import Levels, build_levels
+from hybridreg.learned.layers.distances import squared_distances
+from hybridreg.learned.pyramid.patches import build_patches
+from hybridreg.learned.roitr.encoder_decoder import LevelFeatures
+from hybridreg.learned.roitr.point_levels import Levels, build_levels
 
 # Metres: neighbours whose distances differ by less stand in either order.
 _TIE = 1e-5

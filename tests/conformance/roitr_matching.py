@@ -9,16 +9,16 @@ from roitr_plan import RoitrRecording
 from ties import TIE, Compared, rows_apart
 from torch import Tensor
 
-from hybridreg.learned.distances import squared_distances
-from hybridreg.learned.network import CloudEncoding
-from hybridreg.learned.patches import Patches
-from hybridreg.learned.procrustes import apply_transform, weighted_procrustes
+from hybridreg.learned.cross3dreg.network import CloudEncoding
+from hybridreg.learned.layers.distances import squared_distances
+from hybridreg.learned.matching.procrustes import apply_transform, weighted_procrustes
+from hybridreg.learned.matching.superpoint_matching import SuperpointMatches, match_superpoints
+from hybridreg.learned.pyramid.patches import Patches
 from hybridreg.learned.roitr.losses import losses, right_shares, validation_losses
-from hybridreg.learned.roitr.matching import match_adaptively
 from hybridreg.learned.roitr.network import RoitrOutput
 from hybridreg.learned.roitr.official_names import official_name
+from hybridreg.learned.roitr.superpoint_pairs import match_adaptively
 from hybridreg.learned.roitr.targets import RoitrTargets, compute_targets, visible_shares
-from hybridreg.learned.superpoint_matching import SuperpointMatches, match_superpoints
 
 MODULE, CHAIN = 1e-4, 2e-3
 # The scores of padded entries are some -1e6 there and -1e12 here: neither means anything.

@@ -11,12 +11,12 @@ from typing import Any
 from arrays import read_arrays, read_plan, read_weights
 from torch import Tensor
 
-from hybridreg.learned.config import LossConfig, MatchingConfig, TransformerConfig
+from hybridreg.learned.cross3dreg.config import LossConfig, MatchingConfig, TransformerConfig
 from hybridreg.learned.roitr.batch import RoitrBatch
 from hybridreg.learned.roitr.config import RoitrConfig
-from hybridreg.learned.roitr.levels import Levels
 from hybridreg.learned.roitr.network import RoitrNetwork
 from hybridreg.learned.roitr.official_names import official_name, unused_names
+from hybridreg.learned.roitr.point_levels import Levels
 from hybridreg.learned.weights import load_official_tensors
 
 SIDES = ("src", "tgt")

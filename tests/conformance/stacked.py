@@ -11,10 +11,10 @@ import torch
 from arrays import Found, apart
 from torch import Tensor, nn
 
-from hybridreg.learned.batch import Batch
-from hybridreg.learned.kpfcnn import KpfcnnDecoder, KpfcnnEncoder
-from hybridreg.learned.kpfcnn_config import KpfcnnConfig
-from hybridreg.learned.pyramid import Pyramid
+from hybridreg.learned.cross3dreg.batch import Batch
+from hybridreg.learned.kpfcnn.kpfcnn import KpfcnnDecoder, KpfcnnEncoder
+from hybridreg.learned.kpfcnn.kpfcnn_config import KpfcnnConfig
+from hybridreg.learned.pyramid.point_pyramid import Pyramid
 
 FEATURES, SHARE = 2e-4, 0.01
 # A gradient that is nothing but rounding (of a bias before a normalisation) is held against this instead of itself.

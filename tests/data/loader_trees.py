@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hybridreg import se3
+from hybridreg.geometry import se3
 from hybridreg.io import write_points
 from hybridreg.pair import LabelledPair
 

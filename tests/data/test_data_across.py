@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from loader_trees import T_CAMERA_LIDAR, relative, scan, way, write_bin, write_cloud, write_poses
 
-from hybridreg import se3
 from hybridreg.data import CrossLidar, HeLiPr, Tiers
+from hybridreg.geometry import se3
 
 
 def keyframes(root: Path) -> np.ndarray:
@@ -51,7 +51,7 @@ def test_a_forgotten_calibration_shows_in_the_direction_check(tmp_path: Path) ->
     keyframes(tmp_path)
     right = CrossLidar(tmp_path, "recon", "scans64", min_dist=0.0, target_calib="calib.txt")
     wrong = CrossLidar(tmp_path, "recon", "scans64", min_dist=0.0)
-    from hybridreg.data.direction import measured
+    from hybridreg.data.lists.direction import measured
 
     assert measured(right).as_given > 2 * measured(wrong).as_given
 

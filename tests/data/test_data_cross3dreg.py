@@ -13,8 +13,8 @@ import loader_trees
 import numpy as np
 import pytest
 
-from hybridreg import se3
 from hybridreg.data import Cross3DReg
+from hybridreg.geometry import se3
 
 
 @pytest.fixture(scope="session")

@@ -15,11 +15,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hybridreg import se3
-from hybridreg.data import azimuth, direction, overlapping
-from hybridreg.data.folder import PairFolder
-from hybridreg.data.listed import ListedPairs
-from hybridreg.data.pair_files import PairFiles
+from hybridreg.data.lists import azimuth, direction, overlapping
+from hybridreg.data.lists.listed import ListedPairs
+from hybridreg.data.lists.pair_files import PairFiles
+from hybridreg.data.loaders.folder import PairFolder
+from hybridreg.geometry import se3
 
 
 def ring(start: float, width: float, n: int = 4000, seed: int = 0) -> np.ndarray:

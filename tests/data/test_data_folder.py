@@ -11,8 +11,8 @@ import cv2
 import numpy as np
 import pytest
 
-from hybridreg import se3
 from hybridreg.data import PairFolder, catalogue, open_dataset
+from hybridreg.geometry import se3
 from hybridreg.pair import LabelledPair
 
 T = se3.from_rt(se3.yaw(30.0)[:3, :3], np.array([1.0, 2.0, 3.0]))

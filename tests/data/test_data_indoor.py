@@ -11,8 +11,8 @@ import loader_trees
 import numpy as np
 import pytest
 
-from hybridreg import se3
 from hybridreg.data import ThreeDCsr, ThreeDMatch, open_dataset
+from hybridreg.geometry import se3
 
 
 def test_kinect_is_the_source(tmp_path: Path) -> None:

@@ -12,9 +12,10 @@ import numpy as np
 import pytest
 from loader_trees import Tree, relative, way
 
-from hybridreg import se3
-from hybridreg.data import Kitti, kitti_list
-from hybridreg.data.kitti_drives import Drive
+from hybridreg.data import Kitti
+from hybridreg.data.lists import kitti_list
+from hybridreg.data.lists.kitti_drives import Drive
+from hybridreg.geometry import se3
 from hybridreg.io import read_points
 
 

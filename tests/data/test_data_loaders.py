@@ -14,8 +14,9 @@ import numpy as np
 import pytest
 from loader_trees import Tree
 
-from hybridreg.data import ListedPairs, PairFiles, open_dataset, pair_files, pth
-from hybridreg.data.direction import overlap
+from hybridreg.data import ListedPairs, PairFiles, open_dataset
+from hybridreg.data.lists import pair_files, pth
+from hybridreg.data.lists.direction import overlap
 from hybridreg.pair import LabelledPair
 
 
@@ -121,7 +122,7 @@ def test_fingerprint_follows_the_poses(written: Tree) -> None:
 
 def test_a_large_set_travels_lightly(monkeypatch: pytest.MonkeyPatch) -> None:
     # Parallel runs pickle the set with every task; this is as many pairs as Cross3DReg has.
-    monkeypatch.setattr("hybridreg.data.listed.refuse_missing", lambda *_: None)
+    monkeypatch.setattr("hybridreg.data.lists.listed.refuse_missing", lambda *_: None)
     there = Path("/data/sequences/08")
     many = [
         PairFiles(

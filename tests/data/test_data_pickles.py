@@ -18,8 +18,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hybridreg.data.pickles import globals_of, load, read_pickle
-from hybridreg.data.pth import read_pth
+from hybridreg.data.lists.pickles import globals_of, load, read_pickle
+from hybridreg.data.lists.pth import read_pth
 
 ARRAYS = numpy_strategies.arrays(
     dtype=st.sampled_from(["f4", "f8", "i2", "i8", "u1", ">f8", "?", "U5"]),

@@ -14,8 +14,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hybridreg import se3
-from hybridreg.data import Cross3DReg, Kitti, ThreeDMatch, records, spelling, trajectories
+from hybridreg.data import Cross3DReg, Kitti, ThreeDMatch
+from hybridreg.data.lists import dataset_options, pair_records, trajectories
+from hybridreg.geometry import se3
 
 
 def some_pose(seed: int = 0) -> np.ndarray:
@@ -34,10 +35,10 @@ def test_rows_and_columns_are_the_same_list(tmp_path: Path) -> None:
     columns = {key: [row[key] for row in rows] for key in rows[0]}
     wrapped = {"metadata": rows}
     for content in (rows, tuple(rows), columns, wrapped):
-        read = records.read_records(written(tmp_path / "list.pkl", content))
-        assert [records.find(row, records.SOURCE) for row in read] == ["0.pth", "1.pth", "2.pth"]
+        read = pair_records.read_records(written(tmp_path / "list.pkl", content))
+        assert [pair_records.find(row, pair_records.SOURCE) for row in read] == ["0.pth", "1.pth", "2.pth"]
         for row, T in zip(read, poses, strict=True):
-            assert np.allclose(records.transform_of(row, "pair"), T)
+            assert np.allclose(pair_records.transform_of(row, "pair"), T)
 
 
 @pytest.mark.parametrize(
@@ -55,19 +56,19 @@ def test_rows_and_columns_are_the_same_list(tmp_path: Path) -> None:
 )
 def test_lists_that_are_none(content: Any, told: str, tmp_path: Path) -> None:
     with pytest.raises(ValueError, match=told) as caught:
-        records.read_records(written(tmp_path / "test.pkl", content))
+        pair_records.read_records(written(tmp_path / "test.pkl", content))
     assert "test.pkl" in str(caught.value)
 
 
 def test_empty_file_is_told(tmp_path: Path) -> None:
     (tmp_path / "test.pkl").write_bytes(b"")
     with pytest.raises(ValueError, match=r"test\.pkl: is empty"):
-        records.read_records(tmp_path / "test.pkl")
+        pair_records.read_records(tmp_path / "test.pkl")
 
 
-@pytest.mark.parametrize("name", records.TRANSFORM)
+@pytest.mark.parametrize("name", pair_records.TRANSFORM)
 def test_pose_by_any_name(name: str) -> None:
-    assert np.allclose(records.transform_of({name: some_pose().tolist()}, "pair"), some_pose())
+    assert np.allclose(pair_records.transform_of({name: some_pose().tolist()}, "pair"), some_pose())
 
 
 @pytest.mark.parametrize(
@@ -84,7 +85,7 @@ def test_pose_by_any_name(name: str) -> None:
 )
 def test_poses_that_are_none(record: dict[str, Any], told: str) -> None:
     with pytest.raises(ValueError, match=told) as caught:
-        records.transform_of(record, "list.pkl, pair 3")
+        pair_records.transform_of(record, "list.pkl, pair 3")
     assert "list.pkl, pair 3" in str(caught.value)
 
 
@@ -101,7 +102,7 @@ def test_rounded_poses_become_rotations_again(seed: int, digits: int) -> None:
     [(8, 8), ("08", 8), (np.int64(3), 3), (8.0, 8), ("seq_10", 10), ("08/000123.ply", 123)],
 )
 def test_numbers_however_written(value: Any, number: int) -> None:
-    assert records.number({"seq": value}, records.SEQUENCE, "pair") == number
+    assert pair_records.number({"seq": value}, pair_records.SEQUENCE, "pair") == number
 
 
 @pytest.mark.parametrize(
@@ -109,13 +110,13 @@ def test_numbers_however_written(value: Any, number: int) -> None:
 )
 def test_numbers_that_are_none(value: Any) -> None:
     with pytest.raises(ValueError, match="pair"):
-        records.number({"seq": value}, records.SEQUENCE, "pair")
+        pair_records.number({"seq": value}, pair_records.SEQUENCE, "pair")
 
 
 @pytest.mark.parametrize("value", ["half", [0.5], -0.1, 1.5, float("nan")])
 def test_overlaps_that_are_none(value: Any) -> None:
     with pytest.raises(ValueError, match="it is a share between 0 and 1"):
-        records.overlap({"overlap": value}, "pair")
+        pair_records.overlap({"overlap": value}, "pair")
 
 
 JUNK = st.recursive(
@@ -196,7 +197,7 @@ def loader(root: str, split: str = "test", min_dist: float = 10.0, inverted: boo
     ],
 )
 def test_spelled_options(text: str, options: dict[str, Any]) -> None:
-    assert spelling.parse(text, inspect.signature(loader)) == ("/data", options)
+    assert dataset_options.parse(text, inspect.signature(loader)) == ("/data", options)
 
 
 @pytest.mark.parametrize(
@@ -213,10 +214,10 @@ def test_spelled_options(text: str, options: dict[str, Any]) -> None:
 )
 def test_misspelled_options(text: str, told: str) -> None:
     with pytest.raises(ValueError, match=told):
-        spelling.parse(text, inspect.signature(loader))
+        dataset_options.parse(text, inspect.signature(loader))
 
 
 def test_a_folder_may_have_a_hash_in_its_name(tmp_path: Path) -> None:
     folder = tmp_path / "run#3"
     folder.mkdir()
-    assert spelling.parse(str(folder), inspect.signature(loader)) == (str(folder), {})
+    assert dataset_options.parse(str(folder), inspect.signature(loader)) == (str(folder), {})

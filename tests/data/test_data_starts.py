@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hybridreg import se3
 from hybridreg.data import yaw_starts
+from hybridreg.geometry import se3
 from hybridreg.pair import LabelledPair, Pair
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hybridreg.data.walking import WINDOW, kitti_pairs, pairs_across
+from hybridreg.data.lists.frame_pairs import WINDOW, kitti_pairs, pairs_across
 
 
 def positions(seed: int, n: int, step: float) -> np.ndarray:

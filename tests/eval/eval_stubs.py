@@ -11,11 +11,11 @@ from typing import Any
 
 import numpy as np
 
-from hybridreg import se3
 from hybridreg.cloud import PointCloud
 from hybridreg.data.dataset import Dataset
-from hybridreg.eval.row import Row
-from hybridreg.fitness import Overlay
+from hybridreg.eval.run.row import Row
+from hybridreg.geometry import se3
+from hybridreg.geometry.fitness import Overlay
 from hybridreg.matches import Correspondences, Overlap, Pose
 from hybridreg.pair import LabelledPair, Pair
 from hybridreg.pipeline import Trace

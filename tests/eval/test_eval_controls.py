@@ -11,10 +11,12 @@ import pytest
 from eval_stubs import Scattered
 
 import hybridreg as hr
-from hybridreg import se3, testing
-from hybridreg.eval import formats, recipe, table
-from hybridreg.eval.controls import MARK, Control, TrueOverlap
-from hybridreg.eval.prediction import predict
+from hybridreg import testing
+from hybridreg.eval import table_file, table_run
+from hybridreg.eval.report import formats
+from hybridreg.eval.run.controls import MARK, Control, TrueOverlap
+from hybridreg.eval.run.prediction import predict
+from hybridreg.geometry import se3
 from hybridreg.matches import Correspondences, Overlap
 from hybridreg.pair import LabelledPair
 from hybridreg.scene import Scene
@@ -81,11 +83,11 @@ def test_the_truth_cannot_be_named_in_a_pipeline_file(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match="not registered"):
         told.save(tmp_path / "p.toml")
     with pytest.raises(KeyError, match="only name registered stages"):
-        hr.Pipeline(overlap="hybridreg.eval.controls:TrueOverlap")
+        hr.Pipeline(overlap="hybridreg.eval.run.controls:TrueOverlap")
 
 
 def test_rows_of_a_file_become_controls_and_are_marked(tmp_path: Path) -> None:
-    read = recipe.parse(
+    read = table_file.parse(
         {
             "base": STILL,
             "row": [
@@ -100,7 +102,7 @@ def test_rows_of_a_file_become_controls_and_are_marked(tmp_path: Path) -> None:
     assert mask == Control(pipeline=plain, oracle=True)
     assert blind == Control(pipeline=plain, image=False)
     assert [line.name for line in read.lines] == ["plain", f"mask{MARK}", "blind"]
-    done = table.run(read, Yards(1), tmp_path, data="yards")
+    done = table_run.run(read, Yards(1), tmp_path, data="yards")
     assert sorted(f.name for f in (tmp_path / "predictions").iterdir()) == [
         "blind.jsonl", "mask.jsonl", "plain.jsonl",
     ]  # fmt: skip
@@ -120,4 +122,4 @@ def test_rows_of_a_file_become_controls_and_are_marked(tmp_path: Path) -> None:
 )
 def test_other_controls_are_refused(row: dict[str, object], told: str) -> None:
     with pytest.raises(ValueError, match=told):
-        recipe.parse({"base": STILL, "row": [row]})
+        table_file.parse({"base": STILL, "row": [row]})

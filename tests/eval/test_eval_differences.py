@@ -5,9 +5,10 @@ import numpy as np
 import pytest
 from eval_stubs import row
 
-from hybridreg.eval import PROTOCOLS, formats
-from hybridreg.eval.differences import cells, difference
-from hybridreg.eval.table import Entry, Table
+from hybridreg.eval import PROTOCOLS
+from hybridreg.eval.report import formats
+from hybridreg.eval.score.differences import cells, difference
+from hybridreg.eval.table_run import Entry, Table
 
 KITTI = PROTOCOLS["kitti"]
 

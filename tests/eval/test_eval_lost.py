@@ -19,7 +19,7 @@ from eval_stubs import Moody, RowByRow, Scattered
 from hybridreg import testing
 from hybridreg.data import content, open_dataset, yaw_starts
 from hybridreg.eval import predict, read
-from hybridreg.eval.prediction import weights_of
+from hybridreg.eval.run.prediction import weights_of
 from hybridreg.io.lock import InUse, file_lock
 
 RIGHT = Moody(moods=("right",))

@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hybridreg import se3
-from hybridreg.eval import metrics
+from hybridreg.eval.score import metrics
+from hybridreg.geometry import se3
 
 
 def pose(seed: int, reach: float = 10.0) -> np.ndarray:

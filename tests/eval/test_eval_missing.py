@@ -15,13 +15,15 @@ import pytest
 from typer.testing import CliRunner
 
 import hybridreg as hr
-from hybridreg import testing, wheels
+from hybridreg import testing
+from hybridreg.candidates.candidates import Candidates
 from hybridreg.classical import kiss
-from hybridreg.classical.candidates import Candidates
 from hybridreg.cli.app import app
-from hybridreg.eval import prediction, recipe, table
+from hybridreg.eval import table_file, table_run
+from hybridreg.eval.run import prediction
 from hybridreg.io import write_json, write_points
 from hybridreg.pair import LabelledPair
+from hybridreg.runtime import optional_packages
 
 
 class Hidden(MetaPathFinder):
@@ -60,13 +62,13 @@ def test_a_line_whose_package_is_missing_was_not_run(
     hide: Callable[..., None], pairs: list[LabelledPair], tmp_path: Path
 ) -> None:
     hide("kiss_matcher")
-    done = table.run(recipe.parse(ROWS), pairs, tmp_path, workers=1)
+    done = table_run.run(table_file.parse(ROWS), pairs, tmp_path, workers=1)
     assert [entry.name for entry in done.methods] == ["icp"]
     assert "kiss-matcher" in done.problems["kiss-gicp"]
-    assert table.load(tmp_path).problems == done.problems
-    from hybridreg.eval import report
+    assert table_run.load(tmp_path).problems == done.problems
+    from hybridreg.eval.report import table_report
 
-    for file in report.write(done, recipe.parse(ROWS).protocols, tmp_path, pairs):
+    for file in table_report.write(done, table_file.parse(ROWS).protocols, tmp_path, pairs):
         text = file.read_text()
         assert "kiss-gicp" in text, file.name
         assert "pip install kiss-matcher" in text or "no wheel for Python" in text, file.name
@@ -80,7 +82,7 @@ def test_default_says_what_it_ran_without(
     hide: Callable[..., None], pairs: list[LabelledPair], tmp_path: Path
 ) -> None:
     hide("kiss_matcher")
-    done = table.run(recipe.parse({"row": [{"preset": "default"}]}), pairs, tmp_path, workers=1)
+    done = table_run.run(table_file.parse({"row": [{"preset": "default"}]}), pairs, tmp_path, workers=1)
     assert [entry.name for entry in done.methods] == ["default"]
     assert any("default ran without" in each and "kiss-matcher" in each for each in done.remarks())
 
@@ -88,7 +90,10 @@ def test_default_says_what_it_ran_without(
 def test_nothing_is_said_where_all_is_there(pairs: list[LabelledPair], tmp_path: Path) -> None:
     pytest.importorskip("kiss_matcher")
     assert (
-        table.run(recipe.parse({"row": [{"preset": "default"}]}), pairs, tmp_path, workers=1).remarks() == []
+        table_run.run(
+            table_file.parse({"row": [{"preset": "default"}]}), pairs, tmp_path, workers=1
+        ).remarks()
+        == []
     )
 
 
@@ -130,7 +135,7 @@ def test_other_packages(
     hide(module)
     rows = {"row": [{"preset": preset}]}
     with pytest.raises(ValueError, match=f"none of 1 lines can be run.*{module}|does not come with"):
-        table.run(recipe.parse(rows), pairs, tmp_path, workers=1)
+        table_run.run(table_file.parse(rows), pairs, tmp_path, workers=1)
 
 
 def test_the_command_line_ends_with_two(
@@ -159,19 +164,19 @@ def test_the_command_line_ends_with_two(
 def test_a_python_without_a_wheel_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sys, "version_info", (3, 13, 1, "final", 0))
     assert (
-        wheels.cure("kiss_matcher")
+        optional_packages.cure("kiss_matcher")
         == "kiss-matcher, which has no wheel for Python 3.13: use Python 3.10 to 3.12"
     )
     monkeypatch.setattr(sys, "version_info", (3, 12, 1, "final", 0))
-    assert wheels.cure("kiss_matcher") == "kiss-matcher: run `pip install kiss-matcher`"
+    assert optional_packages.cure("kiss_matcher") == "kiss-matcher: run `pip install kiss-matcher`"
 
 
 @pytest.mark.parametrize("name", ["=1+1", "@evil", "+a", "-b", "\t=c"])
 def test_names_of_lines_are_no_formulas(pairs: list[LabelledPair], tmp_path: Path, name: str) -> None:
-    from hybridreg.eval import formats
+    from hybridreg.eval.report import formats
 
-    rows = recipe.parse({"row": [{"preset": "icp", "name": name}], "protocols": ["kitti"], "title": name})
-    done = table.run(rows, pairs, tmp_path, workers=1, data=name)
+    rows = table_file.parse({"row": [{"preset": "icp", "name": name}], "protocols": ["kitti"], "title": name})
+    done = table_run.run(rows, pairs, tmp_path, workers=1, data=name)
     for row in csv.reader(formats.table_csv(done, rows.protocols).splitlines()):
         for each in row:
             assert each[:1] not in ("=", "@", "+", "\t")

@@ -9,8 +9,10 @@ from typing import Any
 import pytest
 from eval_stubs import Scattered
 
-from hybridreg import shipped_weights
-from hybridreg.eval import formats, paper, recipe, report, table
+from hybridreg.eval import table_file, table_run
+from hybridreg.eval.report import formats, table_report
+from hybridreg.eval.score import paper
+from hybridreg.io import shipped_weights
 
 PRINTED: dict[str, Any] = {
     "source": "a paper",
@@ -22,20 +24,20 @@ STILL = {"voxel": 0.5, "match": "none", "estimate": "identity", "refine": "none"
 
 
 def test_printed_figures_are_a_table_of_their_own(tmp_path: Path) -> None:
-    read = recipe.parse({"base": STILL, "row": [{"name": "ours"}], "paper": PRINTED})
-    done = table.load(table_folder(read, tmp_path))
+    read = table_file.parse({"base": STILL, "row": [{"name": "ours"}], "paper": PRINTED})
+    done = table_run.load(table_folder(read, tmp_path))
     assert done.paper == paper.parse(PRINTED)
     text = formats.markdown(done, read.protocols)
     ours, theirs = text.split("## As printed in a paper, measured on their data: not comparable")
     assert "87.1" not in ours
     assert "| theirs | 6.683 | 87.1 |" in theirs
     assert formats.latex(done, read.protocols).count(r"\begin{table}") == 3
-    assert "As printed in a paper" in report.html(done, read.protocols)
+    assert "As printed in a paper" in table_report.html(done, read.protocols)
     assert "theirs" not in formats.table_csv(done, read.protocols)
 
 
-def table_folder(read: recipe.Recipe, tmp_path: Path) -> Path:
-    table.run(read, Scattered(1), tmp_path, data="scattered")
+def table_folder(read: table_file.Recipe, tmp_path: Path) -> Path:
+    table_run.run(read, Scattered(1), tmp_path, data="scattered")
     return tmp_path
 
 
@@ -48,7 +50,7 @@ def table_folder(read: recipe.Recipe, tmp_path: Path) -> Path:
 )
 def test_a_table_that_is_not_whole_is_refused(changes: dict[str, Any], told: str) -> None:
     with pytest.raises(ValueError, match=told):
-        recipe.parse({"row": [{"preset": "icp"}], "paper": {**PRINTED, **changes}})
+        table_file.parse({"row": [{"preset": "icp"}], "paper": {**PRINTED, **changes}})
 
 
 @pytest.fixture
@@ -63,7 +65,7 @@ def all_weights(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.usefixtures("all_weights")
 def test_the_ablation_is_the_published_one_and_two_controls() -> None:
-    read = recipe.read("ablation")
+    read = table_file.read("ablation")
     assert [line.name[:3] for line in read.lines] == ["(a)", "(b)", "(c)", "(d)", "(e)", "(f)"]
     assert all(line.method is not None for line in read.lines)
     assert read.lines[4].method.oracle  # type: ignore[union-attr]
@@ -77,10 +79,10 @@ def test_the_ablation_is_the_published_one_and_two_controls() -> None:
 
 @pytest.mark.usefixtures("all_weights")
 def test_estimators_and_stages_are_whole_grids() -> None:
-    estimators = recipe.read("estimators")
+    estimators = table_file.read("estimators")
     assert len(estimators.lines) == 2 * 3 * 2
     assert all(line.method is not None for line in estimators.lines)
-    stages = recipe.read("stages")
+    stages = table_file.read("stages")
     assert len(stages.lines) == 3 * 3 * 3 * 2
     misfits = [line for line in stages.lines if line.method is None]
     # FPFH's matches have no groups, which local-to-global estimation needs.
@@ -90,12 +92,12 @@ def test_estimators_and_stages_are_whole_grids() -> None:
 
 @pytest.mark.usefixtures("no_weights")
 def test_rows_without_weights_are_told_not_scored(tmp_path: Path) -> None:
-    read = recipe.read("stages")
+    read = table_file.read("stages")
     assert {line.method is None for line in read.lines} == {True, False}
     missing = [line for line in read.lines if "omp" in line.name or "vgam" in line.name]
     assert all(
         "which do not come with this version" in line.problem for line in missing if "lgr" not in line.name
     )
     with pytest.raises(ValueError, match="none of 6 lines can be run; the first: .*geotransformer-small"):
-        table.run(recipe.read("ablation"), Scattered(1), tmp_path)
+        table_run.run(table_file.read("ablation"), Scattered(1), tmp_path)
     assert not list(tmp_path.iterdir())

@@ -6,8 +6,8 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from hybridreg import se3
-from hybridreg.eval import pictures
+from hybridreg.eval.report import cloud_pictures
+from hybridreg.geometry import se3
 
 ORANGE, BLUE = np.array([217, 95, 2]), np.array([59, 111, 182])
 
@@ -22,7 +22,7 @@ def test_the_picture_shows_both_clouds_before_and_after(tmp_path: Path) -> None:
     rng = np.random.default_rng(0)
     target = np.column_stack([rng.uniform(-20, 20, (40_000, 2)), np.zeros(40_000)])
     source = target[target[:, 0] > 0] - [60.0, 0.0, 0.0]
-    pictures.before_after(
+    cloud_pictures.before_after(
         tmp_path / "p.png", source, target, se3.from_rt(np.eye(3), np.array([60.0, 0.0, 0.0]))
     )
     image = cv2.imread(str(tmp_path / "p.png"))[:, :, ::-1].astype(int)
@@ -38,5 +38,5 @@ def test_the_picture_shows_both_clouds_before_and_after(tmp_path: Path) -> None:
 def test_map_returns_far_away_do_not_shrink_the_scene() -> None:
     near = np.random.default_rng(0).uniform(-10, 10, (1000, 3))
     stray = np.vstack([near, [[900.0, 900.0, 0.0]]])
-    low, high = pictures.window(stray)
+    low, high = cloud_pictures.window(stray)
     assert np.all(high - low < 30.0)

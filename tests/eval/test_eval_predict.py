@@ -10,10 +10,11 @@ import numpy as np
 import pytest
 from eval_stubs import Moody, RowByRow, Scattered
 
-from hybridreg import se3
-from hybridreg.eval import metrics, predict, protocol, read, score
-from hybridreg.eval.store import differences
+from hybridreg.eval import predict, protocol, read, score
+from hybridreg.eval.run.store import differences
+from hybridreg.eval.score import metrics
 from hybridreg.frames import lower_pose
+from hybridreg.geometry import se3
 from hybridreg.pair import Pair
 
 KITTI = protocol("kitti")
@@ -149,7 +150,7 @@ def test_a_changed_configuration_is_refused_and_named(
 
 def test_rows_of_another_version_are_not_mixed_in(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     predict(RowByRow(), Scattered(2), tmp_path / "p.jsonl")
-    monkeypatch.setattr("hybridreg.eval.prediction.__version__", "99.0")
+    monkeypatch.setattr("hybridreg.eval.run.prediction.__version__", "99.0")
     with pytest.raises(ValueError, match=r'version: ".*" before, "99\.0" now'):
         predict(RowByRow(), Scattered(2), tmp_path / "p.jsonl")
 

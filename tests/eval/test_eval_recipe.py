@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 import hybridreg as hr
-from hybridreg.eval import recipe
+from hybridreg.eval import table_file
 
 BASE = {"match": "none", "estimate": "identity", "refine": "icp"}
 
@@ -19,7 +19,7 @@ def write(tmp_path: Path, text: str) -> Path:
 
 
 def test_reads_a_file(tmp_path: Path) -> None:
-    read = recipe.read(write(tmp_path, """
+    read = table_file.read(write(tmp_path, """
         title = "Two rows"
         data = "somewhere"
         protocols = ["fine"]
@@ -47,7 +47,7 @@ def test_reads_a_file(tmp_path: Path) -> None:
 
 def test_a_sweep_is_every_combination() -> None:
     axes = {"refine": ["icp", "gicp", "none"], "downsample": {"voxel": [0.3, 0.6]}}
-    read = recipe.parse({"base": BASE, "sweep": axes})
+    read = table_file.parse({"base": BASE, "sweep": axes})
     assert [line.name for line in read.lines] == [
         f"refine {r}, downsample voxel={v}" for r in ("icp", "gicp", "none") for v in (0.3, 0.6)
     ]
@@ -56,13 +56,13 @@ def test_a_sweep_is_every_combination() -> None:
     }
 
 
-def _pipeline(line: recipe.Line) -> hr.Pipeline:
+def _pipeline(line: table_file.Line) -> hr.Pipeline:
     assert isinstance(line.method, hr.Pipeline)
     return line.method
 
 
 def test_a_combination_that_does_not_fit_stays_with_its_reason() -> None:
-    read = recipe.parse({"base": {**BASE, "voxel": 0.3}, "sweep": {"downsample": ["voxel", "none"]}})
+    read = table_file.parse({"base": {**BASE, "voxel": 0.3}, "sweep": {"downsample": ["voxel", "none"]}})
     fits, misfit = read.lines
     assert fits.method is not None
     assert misfit.method is None
@@ -85,7 +85,7 @@ def test_a_combination_that_does_not_fit_stays_with_its_reason() -> None:
 )
 def test_a_table_that_makes_no_sense_is_refused(table: dict[str, Any], told: str) -> None:
     with pytest.raises(ValueError) as refused:
-        recipe.parse(table)
+        table_file.parse(table)
     assert told in str(refused.value)
 
 
@@ -95,22 +95,22 @@ def test_a_table_that_makes_no_sense_is_refused(table: dict[str, Any], told: str
 )
 def test_unknown_names_list_the_known(table: dict[str, Any]) -> None:
     with pytest.raises(KeyError, match="Known: "):
-        recipe.parse(table)
+        table_file.parse(table)
 
 
 def test_a_file_that_is_none_is_named(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match=r"mine\.toml: not a TOML file"):
-        recipe.read(write(tmp_path, "title ="))
+        table_file.read(write(tmp_path, "title ="))
     with pytest.raises(ValueError, match=r"mine\.toml: the table has no"):
-        recipe.read(write(tmp_path, "seed = 1"))
+        table_file.read(write(tmp_path, "seed = 1"))
     with pytest.raises(FileNotFoundError):
-        recipe.read(tmp_path / "none.toml")
+        table_file.read(tmp_path / "none.toml")
 
 
 def test_the_shipped_table_holds_every_classical_preset() -> None:
     pytest.importorskip("hybridreg.classical.fpfh")
-    assert "classical" in recipe.known()
-    read = recipe.read("classical")
+    assert "classical" in table_file.known()
+    read = table_file.read("classical")
     names = {
         "icp",
         "fpfh-ransac",
@@ -129,4 +129,4 @@ def test_the_shipped_table_holds_every_classical_preset() -> None:
     [("KISS + GICP", "kiss-gicp"), ("../x", "x"), ("°", "row"), ("a.b", "a.b"), ("..", "row")],
 )
 def test_names_become_safe_file_names(name: str, file: str) -> None:
-    assert recipe.slug(name) == file
+    assert table_file.slug(name) == file

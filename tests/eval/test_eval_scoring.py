@@ -9,7 +9,8 @@ from eval_stubs import row
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hybridreg.eval import PROTOCOLS, Protocol, bootstrap, curves, errors, protocol, score, scoring
+from hybridreg.eval import PROTOCOLS, Protocol, protocol, score
+from hybridreg.eval.score import bootstrap, curves, errors, scoring
 
 CROSS, KITTI, PREDATOR = (PROTOCOLS[name] for name in ("cross3dreg", "kitti", "predator"))
 

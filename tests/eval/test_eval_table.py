@@ -14,10 +14,11 @@ import numpy as np
 import pytest
 from eval_stubs import Moody, RowByRow, Scattered, row
 
-from hybridreg.eval import PROTOCOLS, figures, formats, read, report, table
-from hybridreg.eval.recipe import Line, Recipe
-from hybridreg.eval.row import Row
-from hybridreg.eval.table import Entry, Table
+from hybridreg.eval import PROTOCOLS, read, table_run
+from hybridreg.eval.report import formats, plotly_figures, table_report
+from hybridreg.eval.run.row import Row
+from hybridreg.eval.table_file import Line, Recipe
+from hybridreg.eval.table_run import Entry, Table
 
 CROSS, KITTI, PREDATOR = (PROTOCOLS[name] for name in ("cross3dreg", "kitti", "predator"))
 THREE_D = '"hoverinfo":"skip"'
@@ -37,7 +38,7 @@ RECIPE = Recipe(
 @pytest.fixture(scope="module")
 def ran(tmp_path_factory: pytest.TempPathFactory) -> tuple[Table, Path]:
     out = tmp_path_factory.mktemp("table")
-    return table.run(RECIPE, Scattered(3), out, data="scattered"), out
+    return table_run.run(RECIPE, Scattered(3), out, data="scattered"), out
 
 
 def test_runs_every_line_on_every_start(ran: tuple[Table, Path]) -> None:
@@ -62,10 +63,10 @@ def test_running_again_runs_nothing(ran: tuple[Table, Path]) -> None:
     done, out = ran
     before = (out / "predictions" / "exact.jsonl").read_bytes()
     heard: list[tuple[str, Row]] = []
-    table.run(RECIPE, Scattered(3), out, data="scattered", on_row=lambda name, r: heard.append((name, r)))
+    table_run.run(RECIPE, Scattered(3), out, data="scattered", on_row=lambda name, r: heard.append((name, r)))
     assert (out / "predictions" / "exact.jsonl").read_bytes() == before
     assert [name for name, _ in heard] == ["exact"] * 6 + ["moody_<b>"] * 6
-    again = table.load(out)
+    again = table_run.load(out)
     assert [entry.rows for entry in again.entries] == [entry.rows for entry in done.entries]
 
 
@@ -73,21 +74,21 @@ def test_a_changed_line_is_refused(ran: tuple[Table, Path]) -> None:
     _, out = ran
     changed = dataclasses.replace(RECIPE, lines=(Line(name="exact", method=RowByRow(slip=1.0)),))
     with pytest.raises(ValueError, match=r"exact\.jsonl was made by another configuration .*slip"):
-        table.run(changed, Scattered(3), out, data="scattered")
+        table_run.run(changed, Scattered(3), out, data="scattered")
 
 
 def test_files_of_the_same_data_make_a_table(ran: tuple[Table, Path], tmp_path: Path) -> None:
     _, out = ran
     files = [out / "predictions" / name for name in ("moody-b.jsonl", "exact.jsonl")]
-    assert [entry.name for entry in table.of_files(files).entries] == ["identity", "moody-b", "exact"]
-    table.run(dataclasses.replace(RECIPE, starts=0), Scattered(2), tmp_path, data="scattered")
+    assert [entry.name for entry in table_run.of_files(files).entries] == ["identity", "moody-b", "exact"]
+    table_run.run(dataclasses.replace(RECIPE, starts=0), Scattered(2), tmp_path, data="scattered")
     with pytest.raises(ValueError, match="of other data"):
-        table.of_files([files[0], tmp_path / "predictions" / "exact.jsonl"])
+        table_run.of_files([files[0], tmp_path / "predictions" / "exact.jsonl"])
 
 
 def test_a_folder_without_a_table_says_so(tmp_path: Path) -> None:
     with pytest.raises(FileNotFoundError, match="no table was run there"):
-        table.load(tmp_path)
+        table_run.load(tmp_path)
 
 
 def test_caption_names_data_starts_and_protocol(ran: tuple[Table, Path]) -> None:
@@ -172,9 +173,9 @@ def test_fine_print_counts_scenes_not_copies(ran: tuple[Table, Path]) -> None:
 def test_reliability_bins_against_counting() -> None:
     confidence = np.array([0.05, 0.1, 0.5, 0.95, 1.0, 0.9])
     success = np.array([False, True, True, True, True, False])
-    bins = figures.reliability_bins(confidence, success)
+    bins = plotly_figures.reliability_bins(confidence, success)
     assert bins == pytest.approx(np.array([[0.075, 0.5, 2], [0.5, 1.0, 1], [0.95, 2 / 3, 3]]))
-    assert figures.reliability_bins(np.zeros(0), np.zeros(0, bool)).shape == (0, 3)
+    assert plotly_figures.reliability_bins(np.zeros(0), np.zeros(0, bool)).shape == (0, 3)
 
 
 class Outline(HTMLParser):
@@ -201,7 +202,7 @@ def written(ran: tuple[Table, Path], tmp_path_factory: pytest.TempPathFactory) -
     from hybridreg.data import yaw_starts
 
     out = tmp_path_factory.mktemp("report")
-    report.write(ran[0], RECIPE.protocols, out, yaw_starts(Scattered(3), 1, 2))
+    table_report.write(ran[0], RECIPE.protocols, out, yaw_starts(Scattered(3), 1, 2))
     return out
 
 
@@ -219,7 +220,7 @@ def test_the_page_holds_plotly_once_curves_and_views(written: Path) -> None:
     assert text.count("plotly.js v") == 1
     assert text.count("Plotly.newPlot(") == 2 * 4 + 8
     assert text.count(THREE_D) == 8 * 4, "each view: target, aligned, before, true"
-    outside = text.replace(figures.script(), "")
+    outside = text.replace(plotly_figures.script(), "")
     assert set(re.findall(r"https?://[^\"' ]*", outside)) <= {"https://plot.ly"}, (
         "only plotly's own setting, unused"
     )
@@ -243,7 +244,7 @@ def test_worst_pairs_take_turns_and_start_with_the_largest_error() -> None:
         ),
     ]
     both = Table(title="t", data="d", seed=0, starts=0, entries=entries)
-    found = [(name, r.id) for name, r in report.worst(both, CROSS)]
+    found = [(name, r.id) for name, r in table_report.worst(both, CROSS)]
     assert len(found) == 5, "a pair that could not be read cannot be shown"
     assert [name for name, _ in found] == ["a", "b", "a", "b", "a"]
     assert found[1] == ("b", "pair-0")
@@ -251,7 +252,7 @@ def test_worst_pairs_take_turns_and_start_with_the_largest_error() -> None:
 
 
 def test_without_data_the_page_says_so(ran: tuple[Table, Path]) -> None:
-    text = report.html(ran[0], (CROSS,))
+    text = table_report.html(ran[0], (CROSS,))
     assert "no views" in text
     assert THREE_D not in text
 
@@ -261,7 +262,7 @@ def test_hostile_text_cannot_leave_its_place(text: str) -> None:
     bad = [dataclasses.replace(row(0, 1, 0.1), error=text, T=None)]
     hostile = Table(title=text, data=text, seed=0, starts=0, entries=[Entry(name=text, rows=bad)])
     outline = Outline()
-    outline.feed(report.html(hostile, (CROSS,)))
+    outline.feed(table_report.html(hostile, (CROSS,)))
     assert outline.open == []
     assert outline.bold == 0
 
@@ -270,5 +271,7 @@ def test_scoring_again_needs_only_the_file(ran: tuple[Table, Path]) -> None:
     _, out = ran
     stored = read(out / "predictions" / "exact.jsonl")
     assert stored.config["method"]["estimate"]["stage"] == "row-by-row"
-    again: dict[str, Any] = {name: table.load(out).scores(p)["exact"].recall for name, p in PROTOCOLS.items()}
+    again: dict[str, Any] = {
+        name: table_run.load(out).scores(p)["exact"].recall for name, p in PROTOCOLS.items()
+    }
     assert again == dict.fromkeys(PROTOCOLS, 1.0)

@@ -12,10 +12,12 @@ import pytest
 from eval_stubs import Moody, Scattered
 
 import hybridreg as hr
-from hybridreg import se3, testing
-from hybridreg.eval import PROTOCOLS, redrawing, table, trace_pictures
-from hybridreg.eval.controls import Control
-from hybridreg.eval.recipe import Line, Recipe
+from hybridreg import testing
+from hybridreg.eval import PROTOCOLS, table_run
+from hybridreg.eval.report import rerun_for_pictures, stage_pictures
+from hybridreg.eval.run.controls import Control
+from hybridreg.eval.table_file import Line, Recipe
+from hybridreg.geometry import se3
 from hybridreg.matches import Correspondences, Overlap
 from hybridreg.pair import LabelledPair
 from hybridreg.pipeline import Trace
@@ -46,16 +48,16 @@ def test_right_matches_are_green_lines_and_wrong_ones_red(
     traced: tuple[Trace, np.ndarray], tmp_path: Path
 ) -> None:
     trace, T = traced
-    trace_pictures.matches(tmp_path / "right.png", trace, T)
+    stage_pictures.matches(tmp_path / "right.png", trace, T)
     swapped = Correspondences.of(trace.matches.source, trace.matches.target[::-1])
-    trace_pictures.matches(tmp_path / "wrong.png", replace(trace, matches=swapped), T)
+    stage_pictures.matches(tmp_path / "wrong.png", replace(trace, matches=swapped), T)
     # The legend has both colours.
     assert count(tmp_path / "right.png", GREEN) > 20 * max(count(tmp_path / "right.png", RED), 1)
     assert count(tmp_path / "wrong.png", RED) > 20 * max(count(tmp_path / "wrong.png", GREEN), 1)
     # Off by 0.4 m they are right at 1 m, and wrong at 0.3 m.
     off = Correspondences.of(trace.matches.source, trace.matches.target + [0.4, 0.0, 0.0])
     for radius, wanted, other in ((1.0, GREEN, RED), (0.3, RED, GREEN)):
-        trace_pictures.matches(tmp_path / "off.png", replace(trace, matches=off), T, radius)
+        stage_pictures.matches(tmp_path / "off.png", replace(trace, matches=off), T, radius)
         assert count(tmp_path / "off.png", wanted) > 20 * max(count(tmp_path / "off.png", other), 1)
 
 
@@ -65,10 +67,10 @@ def test_a_true_mask_has_no_wrong_colour_and_a_turned_one_little_else(
     trace, T = traced
     trace = replace(trace, scene=replace(trace.scene, pair=replace(trace.scene.pair, image=None)))
     file = tmp_path / "mask.png"
-    trace_pictures.mask(file, trace, T)
+    stage_pictures.mask(file, trace, T)
     right = count(file, GREEN), count(file, RED), count(file, YELLOW)
     turned = Overlap(1.0 - trace.overlap.source, 1.0 - trace.overlap.target)
-    trace_pictures.mask(file, replace(trace, overlap=turned), T)
+    stage_pictures.mask(file, replace(trace, overlap=turned), T)
     wrong = count(file, GREEN), count(file, RED), count(file, YELLOW)
     assert right[0] > 3 * wrong[0]
     assert wrong[1] > 3 * right[1]
@@ -80,7 +82,7 @@ def test_the_photograph_stands_beside_the_mask(traced: tuple[Trace, np.ndarray],
     blue = np.full((72, 128, 3), (10, 20, 250), np.uint8)
     for name, image in (("with", blue), ("without", None)):
         pair = replace(trace.scene.pair, image=image)
-        trace_pictures.mask(
+        stage_pictures.mask(
             tmp_path / f"{name}.png", replace(trace, scene=replace(trace.scene, pair=pair)), T
         )
     assert count(tmp_path / "with.png", (10, 20, 250)) > 20_000
@@ -95,8 +97,8 @@ def test_a_table_is_drawn_again(tmp_path: Path) -> None:
         Line(name="function", method=Moody(moods=("right",))),
     )
     recipe = Recipe(title="t", protocols=(PROTOCOLS["cross3dreg"],), lines=lines)
-    done = table.run(recipe, Scattered(3), tmp_path / "run", data="scattered")
-    files = redrawing.redraw(done, recipe.protocols[0], Scattered(3), tmp_path / "pictures", 2)
+    done = table_run.run(recipe, Scattered(3), tmp_path / "run", data="scattered")
+    files = rerun_for_pictures.redraw(done, recipe.protocols[0], Scattered(3), tmp_path / "pictures", 2)
     assert [file.relative_to(tmp_path / "pictures").as_posix() for file in files] == [
         "plain/pair-0-matches.png",
         "plain/pair-1-matches.png",

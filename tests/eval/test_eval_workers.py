@@ -17,7 +17,7 @@ import pytest
 from eval_stubs import Logged, Moody, RowByRow, Scattered
 
 from hybridreg.eval import predict
-from hybridreg.threads import one_thread
+from hybridreg.runtime.threads import one_thread
 
 N = 8
 

@@ -14,19 +14,20 @@ import numpy as np
 import pytest
 
 import hybridreg as hr
-from benchmarks.hostile.containers import contain
-from benchmarks.hostile.stored import FILES, StoredCase
-from hybridreg import Pipeline, PointCloud, changes, se3, spec
-from hybridreg.classical import sweep as sweep_module
-from hybridreg.classical.columns import Columns, FromAbove
-from hybridreg.data.folder import load_pair
-from hybridreg.eval import recipe, table
-from hybridreg.eval.store import read
+from hybridreg import Pipeline, PointCloud, changes, spec
+from hybridreg.classical.overhead import sweep as sweep_module
+from hybridreg.classical.overhead.overhead_columns import Columns, FromAbove
+from hybridreg.data.loaders.folder import load_pair
+from hybridreg.eval import table_file, table_run
+from hybridreg.eval.run.store import read
+from hybridreg.geometry import se3
 from hybridreg.io import read_points, write_json, write_points
-from hybridreg.learned.config import NetworkConfig
-from hybridreg.learned.sizes import named_config
+from hybridreg.learned.cross3dreg.config import NetworkConfig
+from hybridreg.learned.cross3dreg.sizes import named_config
 from hybridreg.learned.training import recipe_file
 from hybridreg.testing import sample_pair
+from tools.hostile.containers import contain
+from tools.hostile.stored import FILES, StoredCase
 
 POINTS = np.random.default_rng(0).uniform(-10.0, 10.0, (60, 3))
 
@@ -84,7 +85,7 @@ def test_a_seed_that_is_no_seed(seed: Any) -> None:
     ["x = " + "[" * 3000, "x = " + "9" * 5000, "= 1", "\ufeffvoxel = 1", "voxel = 0.3\nvoxel = 0.4"],
     ids=["deep", "digits", "no key", "mark", "twice"],
 )
-@pytest.mark.parametrize("reader", [Pipeline.load, recipe.read, recipe_file.read])
+@pytest.mark.parametrize("reader", [Pipeline.load, table_file.read, recipe_file.read])
 def test_text_that_is_no_toml(tmp_path: Path, reader: Any, text: str) -> None:
     path = tmp_path / "mine.toml"
     path.write_text(text, encoding="utf-8")
@@ -132,7 +133,7 @@ def test_fields_of_a_stage_from_a_file(stage: dict[str, Any], words: str) -> Non
 )
 def test_values_of_a_table_file(content: dict[str, Any]) -> None:
     with pytest.raises(ValueError):
-        recipe.parse(content)
+        table_file.parse(content)
 
 
 def test_fields_upon_a_number_replace_it() -> None:
@@ -232,13 +233,13 @@ def test_a_table_without_a_row_yet(tmp_path: Path) -> None:
     whole = StoredCase(file=FILES[0], line=0).content()
     (tmp_path / "p.jsonl").write_bytes(whole[: whole.index(b"\n") + 1])
     with pytest.raises(ValueError, match="no rows yet"):
-        table.of_files([tmp_path / "p.jsonl"])
+        table_run.of_files([tmp_path / "p.jsonl"])
 
 
 @pytest.mark.filterwarnings("error")
 def test_poses_beyond_any_world_are_no_success(tmp_path: Path) -> None:
     huge = np.full((4, 4), 1e300).tolist()
-    whole = table.of_files([_with_pose(tmp_path, huge)])
+    whole = table_run.of_files([_with_pose(tmp_path, huge)])
     score = whole.scores(hr.eval.protocol("cross3dreg"))["p"]
     assert score.recall < 1.0
 

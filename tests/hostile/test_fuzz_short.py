@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A short campaign of `benchmarks.fuzz`, and the watch that it keeps."""
+"""A short campaign of `tools.fuzz`, and the watch that it keeps."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ import time
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-from benchmarks.hostile import campaign
-from benchmarks.hostile.case import verdict_on
-from benchmarks.hostile.watched import Watched
+from tools.hostile import campaign
+from tools.hostile.case import verdict_on
+from tools.hostile.watched import Watched
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -17,19 +17,20 @@ from typing import Any
 import numpy as np
 import pytest
 
-from benchmarks.hostile.stored import FILES, StoredCase
 from hybridreg import Pipeline, changes
 from hybridreg.data import open_dataset
-from hybridreg.data.pickles import read_pickle
-from hybridreg.data.pth import read_pth
-from hybridreg.data.simulate.folder import read_pair
-from hybridreg.eval import PROTOCOLS, recipe, report, table
-from hybridreg.eval.redrawing import redraw
+from hybridreg.data.lists.pickles import read_pickle
+from hybridreg.data.lists.pth import read_pth
+from hybridreg.data.simulate.simulated_folder import read_pair
+from hybridreg.eval import PROTOCOLS, table_file, table_run
+from hybridreg.eval.report import table_report
+from hybridreg.eval.report.rerun_for_pictures import redraw
 from hybridreg.io import read_image, read_points, write_points
-from hybridreg.learned.sizes import named_config
+from hybridreg.learned.cross3dreg.sizes import named_config
 from hybridreg.learned.training import checkpoint, recipe_file
 from hybridreg.learned.weights import from_pretrained, load_official
 from hybridreg.testing import sample_pair
+from tools.hostile.stored import FILES, StoredCase
 
 POINTS = np.random.default_rng(0).uniform(-10.0, 10.0, (60, 3))
 
@@ -92,7 +93,7 @@ READERS: dict[str, Callable[[Path], Any]] = {
     "network.pth.tar": load_official,
     "state.ckpt": checkpoint.load,
     "pipeline.toml": Pipeline.load,
-    "table.toml": recipe.read,
+    "table.toml": table_file.read,
     "recipe.toml": recipe_file.read,
 }
 
@@ -199,7 +200,7 @@ def test_tables_and_settings_neither(tmp_path: Path, mark: Path, name: str) -> N
         {"row": [{"pipeline": name}]},
     ):
         with pytest.raises(refused):
-            recipe.parse(content)
+            table_file.parse(content)
     with pytest.raises(refused):
         changes.build(changes.parse([f"estimate={name}"]))
     with pytest.raises(refused):
@@ -220,7 +221,7 @@ def test_stored_predictions_are_drawn_again_by_registered_stages_alone(
     else:
         content["config"]["method"]["control"] = control
     (tmp_path / "p.jsonl").write_text("\n".join([json.dumps(content), *rows]) + "\n")
-    done = table.of_files([tmp_path / "p.jsonl"])
+    done = table_run.of_files([tmp_path / "p.jsonl"])
     with pytest.raises((ValueError, KeyError)):
         redraw(done, PROTOCOLS["cross3dreg"], [], tmp_path / "pictures", 1)
     assert not mark.exists()
@@ -239,10 +240,10 @@ def test_a_report_holds_no_markup_of_the_predictions(tmp_path: Path, text: str) 
         row["id"] = f"{text}{i}"
     path = tmp_path / "p.jsonl"
     path.write_text("\n".join(json.dumps(each) for each in (content, *stored)) + "\n")
-    done = table.of_files([path])
-    renamed = table.Entry(name=text, rows=done.methods[0].rows, config=done.methods[0].config)
-    hostile = table.Table(title=text, data=text, seed=0, starts=0, entries=[done.entries[0], renamed])
-    report.write(hostile, [PROTOCOLS["cross3dreg"]], tmp_path / "report")
+    done = table_run.of_files([path])
+    renamed = table_run.Entry(name=text, rows=done.methods[0].rows, config=done.methods[0].config)
+    hostile = table_run.Table(title=text, data=text, seed=0, starts=0, entries=[done.entries[0], renamed])
+    table_report.write(hostile, [PROTOCOLS["cross3dreg"]], tmp_path / "report")
     assert text not in (tmp_path / "report" / "report.html").read_text(encoding="utf-8")
 
 
@@ -254,6 +255,6 @@ def test_pictures_and_predictions_stay_in_their_folder(tmp_path: Path) -> None:
     for kind in ("source", "target"):
         write_points(folder / f"{kind}.ply", POINTS)
     (folder / "meta.json").write_text(json.dumps({"T_target_source": np.eye(4).tolist()}))
-    table.run(recipe.parse(content), open_dataset(tmp_path / "data"), tmp_path / "a" / "b")
+    table_run.run(table_file.parse(content), open_dataset(tmp_path / "data"), tmp_path / "a" / "b")
     assert sorted(p.name for p in tmp_path.iterdir()) == ["a", "data"]
     assert [p.name for p in (tmp_path / "a" / "b" / "predictions").iterdir()] == ["outside.jsonl"]

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from hybridreg.io import read_points
-from hybridreg.io.bin import parse_bin
+from hybridreg.io.formats.bin import parse_bin
 
 
 def rows(n, width, seed=0):

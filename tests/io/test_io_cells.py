@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from hybridreg.io.cells import cell
+from hybridreg.io.csv_cells import cell
 
 FORMULAS = [
     "=1+1",
@@ -42,7 +42,7 @@ def test_what_is_no_text_stays(value: object) -> None:
 
 def test_training_curves_hold_no_formula(tmp_path: Path) -> None:
     pytest.importorskip("torch")
-    from hybridreg.learned.training.log import CurveFile
+    from hybridreg.learned.training.curve_files import CurveFile
 
     curve = CurveFile(tmp_path / "log.csv", ("phase", "loss"))
     curve.begin(0)

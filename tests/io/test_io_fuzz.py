@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hybridreg.io.points import PARSERS, parse_points
+from hybridreg.io.point_files import PARSERS, parse_points
 
 NAMES = [
     "binary_little_endian.ply", "binary_big_endian.ply", "faces_first.ply", "ascii.ply",

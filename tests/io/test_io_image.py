@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 from hybridreg.io import as_image, read_image
-from hybridreg.io.image_size import image_size
+from hybridreg.io.formats.image_size import image_size
 
 
 @pytest.fixture(scope="module")
@@ -230,7 +230,7 @@ def bomb(rows, columns):
 
 
 def test_too_many_pixels_are_refused_before_they_are_decoded(read, monkeypatch):
-    monkeypatch.setattr("hybridreg.io.image._decode", lambda data: pytest.fail("was decoded"))
+    monkeypatch.setattr("hybridreg.io.formats.image._decode", lambda data: pytest.fail("was decoded"))
     with pytest.raises(ValueError, match=r"30000 x 30000 pixels, 900 megapixels; make it smaller: 210"):
         read(bomb(30000, 30000))
     with pytest.raises(ValueError, match="megapixels"):
@@ -255,7 +255,7 @@ def test_any_cut_header_is_no_size_or_a_refusal(ending):
 
 def test_an_image_is_decoded_when_it_is_looked_at(tmp_path, rgb, monkeypatch):
     from hybridreg import Pair
-    from hybridreg.io import image as module
+    from hybridreg.io.formats import image as module
 
     path = tmp_path / "photo.png"
     path.write_bytes(encoded(rgb))

@@ -6,7 +6,7 @@ import io
 import numpy as np
 import pytest
 
-from hybridreg.io.las import parse_las
+from hybridreg.io.formats.las import parse_las
 
 laspy = pytest.importorskip("laspy")
 

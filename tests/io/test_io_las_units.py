@@ -11,7 +11,7 @@ import pytest
 
 laspy = pytest.importorskip("laspy")
 
-from hybridreg.io.las import parse_las  # noqa: E402
+from hybridreg.io.formats.las import parse_las  # noqa: E402
 
 P = np.round(np.random.default_rng(0).uniform(-50, 50, (40, 3)), 2)
 GEOGCS = 'GEOGCS["NAD83",DATUM["D",SPHEROID["GRS",6378137,298.25]],PRIMEM["G",0],UNIT["degree",0.0174532925199433]]'

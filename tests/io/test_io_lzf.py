@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hybridreg.io.lzf import lzf_decompress
+from hybridreg.io.formats.lzf import lzf_decompress
 
 
 def compress(data: bytes) -> bytes:

@@ -9,8 +9,8 @@ import zipfile
 import numpy as np
 import pytest
 
-from hybridreg.io.npy import parse_npy
-from hybridreg.io.npz import parse_npz
+from hybridreg.io.formats.npy import parse_npy
+from hybridreg.io.formats.npz import parse_npz
 
 
 def npy(array, **options):

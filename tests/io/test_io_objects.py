@@ -230,7 +230,7 @@ def test_trimesh() -> None:
 
 
 def test_open3d() -> None:
-    from hybridreg._open3d import load_open3d
+    from hybridreg.runtime.open3d import load_open3d
 
     try:
         o3d = load_open3d()

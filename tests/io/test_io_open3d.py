@@ -6,8 +6,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hybridreg._open3d import load_open3d
 from hybridreg.io import read_points, write_points
+from hybridreg.runtime.open3d import load_open3d
 
 try:
     o3d = load_open3d()

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hybridreg.io.pcd import parse_pcd
+from hybridreg.io.formats.pcd import parse_pcd
 
 CODES = {word: f"<{word.lower()}" for word in ("F4", "F8", "I1", "I2", "I4", "I8", "U1", "U2", "U4", "U8")}
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from hybridreg.io import read_points
-from hybridreg.io.points import parse_points
+from hybridreg.io.point_files import parse_points
 
 
 def test_every_format_gives_the_same_cloud(samples, cloud, tmp_path):

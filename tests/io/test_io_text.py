@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-from hybridreg.io.text import parse_text
+from hybridreg.io.formats.text import parse_text
 
 THREE = np.array([[1.5, 2.0, 3.0], [-4.0, 5.25, 6e3], [7.0, 8.0, -9.0]])
 

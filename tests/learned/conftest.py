@@ -12,10 +12,10 @@ import pytest
 import torch
 from streets import moved, street, yaw
 
-from hybridreg.learned.batch import Batch, make_batch
-from hybridreg.learned.config import NetworkConfig
-from hybridreg.learned.network import RegistrationNetwork
-from hybridreg.learned.sizes import named_config
+from hybridreg.learned.cross3dreg.batch import Batch, make_batch
+from hybridreg.learned.cross3dreg.config import NetworkConfig
+from hybridreg.learned.cross3dreg.network import RegistrationNetwork
+from hybridreg.learned.cross3dreg.sizes import named_config
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.append(str(ROOT / "tests" / "conformance"))

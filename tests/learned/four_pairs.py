@@ -9,7 +9,7 @@ import numpy as np
 import torch
 from streets import moved, street, yaw
 
-from hybridreg.learned.batch import Batch, make_batch
+from hybridreg.learned.cross3dreg.batch import Batch, make_batch
 
 
 class Learned(NamedTuple):

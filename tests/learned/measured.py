@@ -9,7 +9,7 @@ import sys
 
 _AROUND = """
 import numpy as np, torch
-from hybridreg.resources import peak_memory_mb, reset_peak_memory
+from hybridreg.runtime.resources import peak_memory_mb, reset_peak_memory
 torch.set_num_threads(1)
 rng = np.random.default_rng(0)
 {made}

@@ -13,9 +13,9 @@ import torch
 from streets import moved, street, yaw
 from torch import Tensor, nn
 
-from hybridreg.learned.batch import Batch, make_batch
-from hybridreg.learned.procrustes import apply_transform
-from hybridreg.learned.pyramid import Pyramid
+from hybridreg.learned.cross3dreg.batch import Batch, make_batch
+from hybridreg.learned.matching.procrustes import apply_transform
+from hybridreg.learned.pyramid.point_pyramid import Pyramid
 
 TRUTH = yaw(40.0, (1.0, 0.0, 0.0))
 

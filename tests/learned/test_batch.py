@@ -8,9 +8,9 @@ import dataclasses
 import numpy as np
 import pytest
 
-from hybridreg.learned.batch import make_batch
-from hybridreg.learned.config import BackboneConfig
-from hybridreg.learned.sizes import named_config
+from hybridreg.learned.cross3dreg.batch import make_batch
+from hybridreg.learned.cross3dreg.config import BackboneConfig
+from hybridreg.learned.cross3dreg.sizes import named_config
 
 
 def clouds(shift: float = 0.0) -> tuple[np.ndarray, np.ndarray]:

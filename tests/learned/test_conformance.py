@@ -10,8 +10,8 @@ import pytest
 import torch
 from scipy.spatial import cKDTree
 
-from hybridreg.learned.grid import grid_subsample
-from hybridreg.learned.neighbors import radius_neighbors
+from hybridreg.learned.pyramid.grid_subsample import grid_subsample
+from hybridreg.learned.pyramid.neighbors import radius_neighbors
 
 
 @pytest.fixture(scope="module")
@@ -76,7 +76,7 @@ def test_neighbour_sets_reproduce(recording, kind: str) -> None:  # type: ignore
 
 
 def test_nearest_coarse_point_reproduces(recording) -> None:  # type: ignore[no-untyped-def]
-    from hybridreg.learned.pyramid import build_pyramid
+    from hybridreg.learned.pyramid.point_pyramid import build_pyramid
 
     values, plan = recording.values, recording.config.backbone
     own = build_pyramid(values["in.ref_points"], values["in.src_points"], plan)

@@ -15,15 +15,15 @@ import pytest
 import torch
 from streets import moved, street, yaw
 
-from hybridreg.learned.batch import make_batch
-from hybridreg.learned.circle_loss import circle_loss
-from hybridreg.learned.fine_loss import assignment_loss
-from hybridreg.learned.lgr import local_to_global
-from hybridreg.learned.losses import overlap_matrix
-from hybridreg.learned.network import RegistrationNetwork
-from hybridreg.learned.official_names import official_name
-from hybridreg.learned.procrustes import apply_transform
-from hybridreg.learned.targets import compute_targets
+from hybridreg.learned.cross3dreg.batch import make_batch
+from hybridreg.learned.cross3dreg.losses import overlap_matrix
+from hybridreg.learned.cross3dreg.network import RegistrationNetwork
+from hybridreg.learned.cross3dreg.targets import compute_targets
+from hybridreg.learned.geotransformer.official_names import official_name
+from hybridreg.learned.losses.circle_loss import circle_loss
+from hybridreg.learned.losses.fine_loss import assignment_loss
+from hybridreg.learned.matching.local_to_global import local_to_global
+from hybridreg.learned.matching.procrustes import apply_transform
 
 MARGINS = {"positive_margin": 0.1, "negative_margin": 1.4, "positive_optimal": 0.1, "negative_optimal": 1.4}
 

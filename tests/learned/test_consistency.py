@@ -6,8 +6,8 @@ from __future__ import annotations
 import pytest
 import torch
 
-from hybridreg.learned import consistency
-from hybridreg.learned.consistency import consistent
+from hybridreg.learned.matching import consistency
+from hybridreg.learned.matching.consistency import consistent
 
 
 def planted(n: int, right: int, seed: int = 0) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:

@@ -7,9 +7,9 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hybridreg.learned.bags import Bags
-from hybridreg.learned.curve_table import interpolate, sample_positions
-from hybridreg.learned.positions import frequencies, sinusoids
+from hybridreg.learned.layers.curve_table import interpolate, sample_positions
+from hybridreg.learned.layers.positions import frequencies, sinusoids
+from hybridreg.learned.layers.sparse_rows import Bags
 
 
 @settings(max_examples=20, deadline=None)

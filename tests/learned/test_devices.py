@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 import torch
 
-from hybridreg.learned.batch import make_batch
-from hybridreg.learned.network import RegistrationNetwork
-from hybridreg.learned.sizes import named_config
-from hybridreg.learned.targets import compute_targets
-from hybridreg.learned.training_step import training_losses
+from hybridreg.learned.cross3dreg.batch import make_batch
+from hybridreg.learned.cross3dreg.network import RegistrationNetwork
+from hybridreg.learned.cross3dreg.sizes import named_config
+from hybridreg.learned.cross3dreg.targets import compute_targets
+from hybridreg.learned.cross3dreg.training_step import training_losses
 
 DEVICES = [
     "cpu",

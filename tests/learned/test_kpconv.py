@@ -11,13 +11,13 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hybridreg.learned.blocks import PointGroupNorm, linear_on_joined, upsample
-from hybridreg.learned.dense_influence import DenseLinks
-from hybridreg.learned.group_norm import group_norm
-from hybridreg.learned.influence import find_links
-from hybridreg.learned.kernel_points import cylindrical_kernel_points, kernel_points
-from hybridreg.learned.kpconv import KPConv, kernel_point_convolution
-from hybridreg.learned.max_pool import max_pool
+from hybridreg.learned.layers.dense_influence import DenseLinks
+from hybridreg.learned.layers.group_norm import group_norm
+from hybridreg.learned.layers.influence import find_links
+from hybridreg.learned.layers.kernel_points import cylindrical_kernel_points, kernel_points
+from hybridreg.learned.layers.kpconv import KPConv, kernel_point_convolution
+from hybridreg.learned.layers.kpconv_blocks import PointGroupNorm, linear_on_joined, upsample
+from hybridreg.learned.layers.max_pool import max_pool
 
 
 def by_loops(queries, supports, neighbors, kernel, sigma, features, weights, bias):  # type: ignore[no-untyped-def]

@@ -10,9 +10,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from hybridreg.learned.config import LgrConfig
-from hybridreg.learned.lgr import local_to_global
-from hybridreg.learned.procrustes import apply_transform, weighted_procrustes
+from hybridreg.learned.cross3dreg.config import LgrConfig
+from hybridreg.learned.matching.local_to_global import local_to_global
+from hybridreg.learned.matching.procrustes import apply_transform, weighted_procrustes
 
 
 def pose(seed: int) -> torch.Tensor:

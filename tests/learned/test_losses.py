@@ -9,18 +9,18 @@ import torch
 from scipy.spatial import cKDTree
 from streets import street
 
-from hybridreg.learned.batch import Batch, make_batch
-from hybridreg.learned.circle_loss import circle_loss
-from hybridreg.learned.config import LossConfig, NetworkConfig
-from hybridreg.learned.fine_loss import assignment_loss, true_assignment
-from hybridreg.learned.losses import Losses
-from hybridreg.learned.mask_loss import focal_loss
-from hybridreg.learned.network import RegistrationNetwork
-from hybridreg.learned.patch_pairs import PatchPairs
-from hybridreg.learned.sizes import named_config
-from hybridreg.learned.targets import compute_targets
-from hybridreg.learned.training_mask import MaskJitter, training_mask
-from hybridreg.learned.training_step import sample_target_pairs, training_losses
+from hybridreg.learned.cross3dreg.batch import Batch, make_batch
+from hybridreg.learned.cross3dreg.config import LossConfig, NetworkConfig
+from hybridreg.learned.cross3dreg.losses import Losses
+from hybridreg.learned.cross3dreg.network import RegistrationNetwork
+from hybridreg.learned.cross3dreg.sizes import named_config
+from hybridreg.learned.cross3dreg.targets import compute_targets
+from hybridreg.learned.cross3dreg.training_mask import MaskJitter, training_mask
+from hybridreg.learned.cross3dreg.training_step import sample_target_pairs, training_losses
+from hybridreg.learned.losses.circle_loss import circle_loss
+from hybridreg.learned.losses.fine_loss import assignment_loss, true_assignment
+from hybridreg.learned.losses.mask_loss import focal_loss
+from hybridreg.learned.matching.patch_pairs import PatchPairs
 
 
 def test_overlaps_equal_brute_force(batch: Batch, nano: NetworkConfig, truth: np.ndarray) -> None:

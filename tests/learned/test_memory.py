@@ -11,13 +11,13 @@ import torch
 from measured import peak_and_estimate
 from streets import street
 
-from hybridreg.learned import memory
-from hybridreg.learned.pyramid import build_pyramid
-from hybridreg.learned.sizes import named_config
+from hybridreg.learned import memory_estimate
+from hybridreg.learned.cross3dreg.sizes import named_config
+from hybridreg.learned.pyramid.point_pyramid import build_pyramid
 
 _MADE = """
-from hybridreg.learned.batch import make_batch
-from hybridreg.learned.network import RegistrationNetwork
+from hybridreg.learned.cross3dreg.batch import make_batch
+from hybridreg.learned.cross3dreg.network import RegistrationNetwork
 network = RegistrationNetwork.named("nano")
 clouds = [rng.uniform(0, 70, (20000, 3)) * [1, 1, 0.02] for _ in range(2)]
 batch = make_batch(*clouds, network.config, subsample=False)
@@ -29,21 +29,21 @@ def test_the_estimate_is_near_and_not_below() -> None:
     # Blocks that go back to the system at once leave the heap's slack out, which differs from run to run by some tens
     # of megabytes.
     real, estimate = peak_and_estimate(_MADE)
-    assert real <= estimate - memory.SLACK <= 1.25 * real
+    assert real <= estimate - memory_estimate.SLACK <= 1.25 * real
 
 
 def test_too_large_a_pair_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     config = named_config("nano")
     clouds = [torch.from_numpy(street(seed, 300)) for seed in (1, 2)]
     pyramid = build_pyramid(*clouds, config.backbone)
-    memory.require_memory(pyramid, config)
-    monkeypatch.setattr(memory, "available_bytes", lambda device: 10**6)
+    memory_estimate.require_memory(pyramid, config)
+    monkeypatch.setattr(memory_estimate, "available_bytes", lambda device: 10**6)
     with pytest.raises(ValueError, match=r"300 target and 300 source points.*voxel larger than 0.5 m"):
-        memory.require_memory(pyramid, config)
+        memory_estimate.require_memory(pyramid, config)
 
 
 def test_the_machine_tells_what_is_free() -> None:
-    free = memory.available_bytes()
+    free = memory_estimate.available_bytes()
     assert free is None or free > 2**20
 
 
@@ -53,5 +53,5 @@ def test_more_points_take_more() -> None:
     sizes = []
     for n in (100, 1000):
         cloud = torch.from_numpy((rng.uniform(0, n**0.5, (n, 3)) * [1, 1, 0.02]).astype(np.float32))
-        sizes.append(memory.forward_bytes(build_pyramid(cloud, cloud, config.backbone), config))
+        sizes.append(memory_estimate.forward_bytes(build_pyramid(cloud, cloud, config.backbone), config))
     assert sizes[0] < sizes[1]

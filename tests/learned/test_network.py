@@ -11,17 +11,17 @@ import pytest
 import torch
 from streets import moved, street, yaw
 
-from hybridreg.learned.batch import Batch, make_batch
-from hybridreg.learned.config import MatchingConfig, NetworkConfig, OmpConfig, TransformerConfig
-from hybridreg.learned.image_encoder import ImageEncoder
-from hybridreg.learned.image_input import image_tensor
-from hybridreg.learned.lgr import local_to_global
-from hybridreg.learned.network import Output, RegistrationNetwork
-from hybridreg.learned.patches import build_patches
-from hybridreg.learned.sizes import named_config
-from hybridreg.learned.structure_embedding import StructureEmbedding
-from hybridreg.learned.superpoint_mask import cap, keep_all, keep_predicted
-from hybridreg.learned.targets import compute_targets
+from hybridreg.learned.cross3dreg.batch import Batch, make_batch
+from hybridreg.learned.cross3dreg.config import MatchingConfig, NetworkConfig, OmpConfig, TransformerConfig
+from hybridreg.learned.cross3dreg.image_encoder import ImageEncoder
+from hybridreg.learned.cross3dreg.image_input import image_tensor
+from hybridreg.learned.cross3dreg.network import Output, RegistrationNetwork
+from hybridreg.learned.cross3dreg.sizes import named_config
+from hybridreg.learned.cross3dreg.superpoint_mask import cap, keep_all, keep_predicted
+from hybridreg.learned.cross3dreg.targets import compute_targets
+from hybridreg.learned.geotransformer.structure_embedding import StructureEmbedding
+from hybridreg.learned.matching.local_to_global import local_to_global
+from hybridreg.learned.pyramid.patches import build_patches
 
 
 @torch.no_grad()
@@ -168,7 +168,7 @@ def test_a_capped_network_stays_within_its_cap(batch: Batch) -> None:
 
 
 def test_structure_is_unchanged_by_motion_and_chunks(monkeypatch: pytest.MonkeyPatch) -> None:
-    from hybridreg.learned import structure_embedding
+    from hybridreg.learned.geotransformer import structure_embedding
 
     torch.manual_seed(0)
     embedding = StructureEmbedding(32, 4.0, 15.0, 3)

@@ -8,11 +8,12 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hybridreg.learned import patch_pairs, patches
-from hybridreg.learned.patch_pairs import pair_patches, size_chunks
-from hybridreg.learned.patches import build_patches
-from hybridreg.learned.point_matching import mutual_top_k
-from hybridreg.learned.superpoint_matching import match_superpoints
+from hybridreg.learned.matching import patch_pairs
+from hybridreg.learned.matching.patch_pairs import pair_patches, size_chunks
+from hybridreg.learned.matching.point_matching import mutual_top_k
+from hybridreg.learned.matching.superpoint_matching import match_superpoints
+from hybridreg.learned.pyramid import patches
+from hybridreg.learned.pyramid.patches import build_patches
 
 
 @settings(max_examples=30, deadline=None)

@@ -7,8 +7,8 @@ import pytest
 import torch
 from torch.nn import functional as F
 
-from hybridreg.learned import point_similarity
-from hybridreg.learned.point_similarity import Voters, compare_points
+from hybridreg.learned.matching import point_similarity
+from hybridreg.learned.matching.point_similarity import Voters, compare_points
 
 TEMPERATURE = 0.1
 

@@ -8,7 +8,7 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hybridreg.learned.sinkhorn import OptimalTransport, kernel_sinkhorn, log_sinkhorn
+from hybridreg.learned.matching.sinkhorn import OptimalTransport, kernel_sinkhorn, log_sinkhorn
 
 ALPHA = torch.tensor(1.0)
 

@@ -9,10 +9,10 @@ import pytest
 import torch
 from four_pairs import four_pairs
 
-from hybridreg.learned import backbone
 from hybridreg.learned.cofinet.network import CofinetNetwork
 from hybridreg.learned.cofinet.targets import compute_targets as cofinet_targets
-from hybridreg.learned.dense_influence import DenseLinks
+from hybridreg.learned.geotransformer import kpconv_fpn
+from hybridreg.learned.layers.dense_influence import DenseLinks
 from hybridreg.learned.predator.network import PredatorNetwork
 from hybridreg.learned.predator.targets import compute_targets as predator_targets
 
@@ -47,7 +47,9 @@ def run(cls: Any, device: str) -> dict[str, torch.Tensor]:
 def test_devices_agree(cls: Any, device: str, monkeypatch: pytest.MonkeyPatch) -> None:
     expected = run(cls, "cpu")
     if device == "dense":
-        monkeypatch.setattr(backbone, "_links", lambda q, s, n, cylindrical, exact: DenseLinks.find(q, s, n))
+        monkeypatch.setattr(
+            kpconv_fpn, "_links", lambda q, s, n, cylindrical, exact: DenseLinks.find(q, s, n)
+        )
     got = run(cls, "cpu" if device == "dense" else device)
     for name, value in expected.items():
         assert torch.allclose(got[name].double(), value.double(), atol=1e-3), name

@@ -10,11 +10,11 @@ import pytest
 import torch
 from torch.nn import functional as F
 
-from hybridreg.learned import superpoint_evidence as module
-from hybridreg.learned.batch import make_batch
-from hybridreg.learned.network import Known, RegistrationNetwork
-from hybridreg.learned.sizes import named_config
-from hybridreg.learned.superpoint_evidence import SIZE, superpoint_evidence
+from hybridreg.learned.cross3dreg import superpoint_evidence as module
+from hybridreg.learned.cross3dreg.batch import make_batch
+from hybridreg.learned.cross3dreg.network import Known, RegistrationNetwork
+from hybridreg.learned.cross3dreg.sizes import named_config
+from hybridreg.learned.cross3dreg.superpoint_evidence import SIZE, superpoint_evidence
 from tests.learned.streets import moved, street, yaw
 
 TEMPERATURE = 0.1

@@ -10,13 +10,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from streets import street
 
-from hybridreg.learned import neighbors as module
-from hybridreg.learned.batch import make_batch
-from hybridreg.learned.config import BackboneConfig, NetworkConfig
-from hybridreg.learned.grid import grid_subsample
-from hybridreg.learned.input_features import input_features
-from hybridreg.learned.neighbors import _radius_neighbors_tensor, nearest_neighbor, radius_neighbors
-from hybridreg.learned.pyramid import build_pyramid, calibrate_neighbor_limits
+from hybridreg.learned.cross3dreg.batch import make_batch
+from hybridreg.learned.cross3dreg.config import BackboneConfig, NetworkConfig
+from hybridreg.learned.pyramid import neighbors as module
+from hybridreg.learned.pyramid.grid_subsample import grid_subsample
+from hybridreg.learned.pyramid.input_features import input_features
+from hybridreg.learned.pyramid.neighbors import _radius_neighbors_tensor, nearest_neighbor, radius_neighbors
+from hybridreg.learned.pyramid.point_pyramid import build_pyramid, calibrate_neighbor_limits
 
 PLAN = BackboneConfig(stages=4, voxel=0.5, init_dim=16, groups=4, neighbor_limits=(12, 12, 12, 12))
 

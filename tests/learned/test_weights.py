@@ -11,11 +11,11 @@ import pytest
 import torch
 from safetensors.torch import load_file, save_file
 
-from hybridreg.learned.batch import Batch
-from hybridreg.learned.config import BackboneConfig, NetworkConfig, TransformerConfig
-from hybridreg.learned.network import RegistrationNetwork
-from hybridreg.learned.official_names import official_name
-from hybridreg.learned.sizes import named_config
+from hybridreg.learned.cross3dreg.batch import Batch
+from hybridreg.learned.cross3dreg.config import BackboneConfig, NetworkConfig, TransformerConfig
+from hybridreg.learned.cross3dreg.network import RegistrationNetwork
+from hybridreg.learned.cross3dreg.sizes import named_config
+from hybridreg.learned.geotransformer.official_names import official_name
 from hybridreg.learned.weights import from_pretrained, load_official, save_pretrained
 
 

@@ -6,12 +6,12 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-import worlds
 from numpy.typing import NDArray
 
-from hybridreg import se3
 from hybridreg.classical.voxel import VoxelGrid
 from hybridreg.cloud import PointCloud
+from hybridreg.data.hard import box_world
+from hybridreg.geometry import se3
 from hybridreg.pair import Pair
 from hybridreg.scene import Scene
 
@@ -23,10 +23,12 @@ class Made(NamedTuple):
     truth: Array  # T_target_source
 
 
-def make(world: worlds.World, source: str, target: str, T_world_source: Array, T_world_target: Array) -> Made:
+def make(
+    world: box_world.World, source: str, target: str, T_world_source: Array, T_world_target: Array
+) -> Made:
     rng = np.random.default_rng(1)
     clouds = [
-        worlds.scan(world, *where, rng) for where in ((source, T_world_source), (target, T_world_target))
+        box_world.scan(world, *where, rng) for where in ((source, T_world_source), (target, T_world_target))
     ]
     pair = Pair(source=PointCloud.of(clouds[0]), target=PointCloud.of(clouds[1]))
     return Made(VoxelGrid()(pair), se3.inverse(T_world_target) @ T_world_source)

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from made_places import Made
 
-from hybridreg import se3
-from hybridreg.verdict import views
-from hybridreg.verdict.agreement import Agreement, compare
-from hybridreg.verdict.relief import Alike
+from hybridreg.evidence import views
+from hybridreg.evidence.agreement import Agreement, compare
+from hybridreg.geometry import se3
+from hybridreg.geometry.ground_relief import Alike
 
 SHIFT = se3.from_rt(np.eye(3), np.array([3.0, 0.0, 0.0]))
 

@@ -7,10 +7,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from made_places import Made
 
-from hybridreg import se3
-from hybridreg.verdict import views
-from hybridreg.verdict.axes import balanced, main_axes
-from hybridreg.verdict.settle import settle
+from hybridreg.evidence import views
+from hybridreg.geometry import se3
+from hybridreg.geometry.main_axes import balanced, main_axes
+from hybridreg.search.settle import settle
 
 
 @given(st.integers(0, 2**32 - 1))

@@ -3,24 +3,24 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-import worlds
 
-from hybridreg import se3
 from hybridreg.classical.voxel import VoxelGrid
 from hybridreg.cloud import PointCloud
+from hybridreg.data.hard import box_world
+from hybridreg.evidence import support, views
+from hybridreg.geometry import se3
 from hybridreg.pair import Pair
 from hybridreg.scene import Scene
-from hybridreg.verdict import support, views
-from hybridreg.verdict.climb import climb
+from hybridreg.search.pattern_search import climb
 
 
 @pytest.fixture(scope="module")
 def yard() -> tuple[Scene, np.ndarray]:
     rng = np.random.default_rng(4)
-    world = worlds.yard(rng)
-    at = [worlds.sensor_pose(0, 0, 1.8, 20), worlds.sensor_pose(4, 1, 1.8, 130)]
+    world = box_world.yard(rng)
+    at = [box_world.sensor_pose(0, 0, 1.8, 20), box_world.sensor_pose(4, 1, 1.8, 130)]
     source, target = (
-        PointCloud.of(worlds.scan(world, sensor, pose, rng))
+        PointCloud.of(box_world.scan(world, sensor, pose, rng))
         for sensor, pose in zip(("rings32", "rings64"), at, strict=True)
     )
     return VoxelGrid()(Pair(source=source, target=target)), se3.inverse(at[1]) @ at[0]

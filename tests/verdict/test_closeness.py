@@ -6,12 +6,13 @@ import pytest
 from made_places import Made
 
 import hybridreg as hr
-from hybridreg import se3
 from hybridreg.classical.voxel import VoxelGrid
+from hybridreg.evidence.surface_distance import closeness, settle_closely
+from hybridreg.geometry import se3
 from hybridreg.matches import Pose
-from hybridreg.verdict import rivals, weigh
-from hybridreg.verdict.closeness import closeness, settle_closely
-from hybridreg.verdict.rivals import Rival, told_apart
+from hybridreg.search import rivals
+from hybridreg.search.rivals import Rival, told_apart
+from hybridreg.verdict import weigh
 
 
 def moved(metres: tuple[float, float, float], yaw_deg: float, truth: np.ndarray) -> np.ndarray:

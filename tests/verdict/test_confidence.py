@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from benchmarks.boosting import boost, plain
+from hybridreg.evidence.support import beside, model, support, terms
 from hybridreg.verdict.boosted import Boosted
 from hybridreg.verdict.confidence import (
     FAILED,
@@ -20,7 +20,7 @@ from hybridreg.verdict.confidence import (
     trees,
     word,
 )
-from hybridreg.verdict.support import beside, model, support, terms
+from hybridreg.verdict.training.boosting import boost, plain
 
 share = st.floats(0.0, 1.0)
 EVIDENCE = {

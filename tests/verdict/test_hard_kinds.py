@@ -9,17 +9,18 @@ import numpy as np
 import pytest
 from made_places import Made
 
-from hybridreg import se3
-from hybridreg.classical import mistakes
+from hybridreg.candidates import input_mistakes
 from hybridreg.classical.voxel import VoxelGrid
+from hybridreg.evidence import support, views
+from hybridreg.evidence.orientation import overturned
+from hybridreg.evidence.scale import size
+from hybridreg.geometry import se3
 from hybridreg.matches import Correspondences, Pose
 from hybridreg.pair import Pair
 from hybridreg.resolution import comparable, tolerance
 from hybridreg.scene import Scene
-from hybridreg.verdict import judge, support, views
-from hybridreg.verdict.copies import copies
-from hybridreg.verdict.similarity import size
-from hybridreg.verdict.upright import overturned
+from hybridreg.search.repeats import copies
+from hybridreg.verdict import judge
 
 NONE = Correspondences.none()
 
@@ -96,7 +97,7 @@ def test_a_map_that_holds_a_place_twice_shows_its_other_copy(crossing: Made) -> 
 
 
 def test_a_mirrored_source_is_named(crossing: Made) -> None:
-    told = mistakes.explanations(VoxelGrid()(changed(crossing, np.array([1.0, -1.0, 1.0]))))
+    told = input_mistakes.explanations(VoxelGrid()(changed(crossing, np.array([1.0, -1.0, 1.0]))))
     assert told
     assert "mirror image" in told[0]
 
@@ -105,19 +106,19 @@ def test_a_mirrored_source_is_named(crossing: Made) -> None:
     "factor, unit", [(1000.0, "millimetres"), (100.0, "centimetres"), (1 / 0.3048, "feet")]
 )
 def test_another_unit_is_named_with_its_cloud(crossing: Made, factor: float, unit: str) -> None:
-    told = mistakes.explanations(VoxelGrid()(changed(crossing, factor)))
+    told = input_mistakes.explanations(VoxelGrid()(changed(crossing, factor)))
     assert told
     assert f"the source is taken to be in {unit}" in told[0]
     pair = changed(crossing, factor)
-    told = mistakes.explanations(VoxelGrid()(Pair(source=pair.target, target=pair.source)))
+    told = input_mistakes.explanations(VoxelGrid()(Pair(source=pair.target, target=pair.source)))
     assert told
     assert f"the target is taken to be in {unit}" in told[0]
 
 
 def test_a_right_pair_is_no_mistake(crossing: Made, elsewhere: Scene) -> None:
     assert comparable(crossing.scene.pair.source, crossing.scene.pair.target)
-    assert mistakes.explanations(crossing.scene) == []
-    assert mistakes.explanations(elsewhere) == []
+    assert input_mistakes.explanations(crossing.scene) == []
+    assert input_mistakes.explanations(elsewhere) == []
 
 
 def test_the_tolerance_follows_the_size_of_the_scene(crossing: Made) -> None:

@@ -3,26 +3,26 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-import worlds
 
-from hybridreg import se3
 from hybridreg.classical.voxel import VoxelGrid
 from hybridreg.cloud import PointCloud
+from hybridreg.data.hard import box_world
+from hybridreg.evidence import support, views
+from hybridreg.evidence.surface_distance import closeness
+from hybridreg.geometry import se3
 from hybridreg.pair import Pair
 from hybridreg.scene import Scene
-from hybridreg.verdict import support, views
-from hybridreg.verdict.closeness import closeness
-from hybridreg.verdict.hop import hop
-from hybridreg.verdict.settle import settle
+from hybridreg.search.basin_hopping import hop
+from hybridreg.search.settle import settle
 
 
 @pytest.fixture(scope="module")
 def street() -> tuple[Scene, np.ndarray]:
     rng = np.random.default_rng(2)
-    world = worlds.street(rng)
-    at = [worlds.sensor_pose(0, 0, 1.8, 10), worlds.sensor_pose(6, 1, 1.8, -20)]
+    world = box_world.street(rng)
+    at = [box_world.sensor_pose(0, 0, 1.8, 10), box_world.sensor_pose(6, 1, 1.8, -20)]
     source, target = (
-        PointCloud.of(worlds.scan(world, sensor, pose, rng))
+        PointCloud.of(box_world.scan(world, sensor, pose, rng))
         for sensor, pose in zip(("rings32", "rings64"), at, strict=True)
     )
     return VoxelGrid()(Pair(source=source, target=target)), se3.inverse(at[1]) @ at[0]

@@ -5,11 +5,11 @@ import numpy as np
 import pytest
 from made_places import Made
 
-from hybridreg import se3
-from hybridreg.verdict import information, views
-from hybridreg.verdict.agreement import compare
-from hybridreg.verdict.information import Information
-from hybridreg.verdict.settle import settle
+from hybridreg.evidence import information, views
+from hybridreg.evidence.agreement import compare
+from hybridreg.evidence.information import Information
+from hybridreg.geometry import se3
+from hybridreg.search.settle import settle
 
 
 def held(made: Made) -> Information:

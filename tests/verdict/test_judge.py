@@ -3,15 +3,16 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-import worlds
 from made_places import Made, make
 
-from hybridreg import se3
 from hybridreg.classical.voxel import VoxelGrid
+from hybridreg.data.hard import box_world
+from hybridreg.evidence import views
+from hybridreg.geometry import se3
 from hybridreg.matches import Correspondences, Pose
 from hybridreg.scene import Scene
-from hybridreg.verdict import Judgement, judge, views
-from hybridreg.verdict.settle import settle
+from hybridreg.search.settle import settle
+from hybridreg.verdict import Judgement, judge
 
 NONE = Correspondences.none()
 
@@ -64,11 +65,15 @@ def test_a_corridor_is_doubtful_and_its_direction_named(corridor: Made) -> None:
 
 
 def test_a_symmetric_room_has_its_double_among_the_rivals() -> None:
-    room = worlds.World(ceiling=3.0)
+    room = box_world.World(ceiling=3.0)
     for x, y, w, d in ((5, 0, 0.2, 6), (-5, 0, 0.2, 6), (0, 3, 10, 0.2), (0, -3, 10, 0.2)):
         room.box(x, y, (w, d, 3.0))
     made = make(
-        room, "rings32", "rings64", worlds.sensor_pose(0.6, 0.2, 1.3, 30), worlds.sensor_pose(0, 0, 1.3, 0)
+        room,
+        "rings32",
+        "rings64",
+        box_world.sensor_pose(0.6, 0.2, 1.3, 30),
+        box_world.sensor_pose(0, 0, 1.3, 0),
     )
     judgement = judge(made.scene, Pose(made.truth), NONE)
     double = se3.yaw(180.0) @ made.truth
@@ -136,7 +141,7 @@ def test_matches_that_agree_are_counted(crossing: Made) -> None:
 
 
 def test_fitness_is_open3ds(crossing: Made) -> None:
-    from hybridreg._open3d import load_open3d
+    from hybridreg.runtime.open3d import load_open3d
 
     try:
         o3d = load_open3d()

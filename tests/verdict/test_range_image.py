@@ -3,13 +3,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-import worlds
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from hybridreg import se3
-from hybridreg.range_image import RangeImage, Seen, angular_resolution
+from hybridreg.data.hard import box_world
+from hybridreg.geometry import se3
+from hybridreg.geometry.range_image import RangeImage, Seen, angular_resolution
 
 Array = NDArray[np.float64]
 SENSORS = ["rings16", "rings32", "rings64", "hemisphere", "rosette", "raster"]
@@ -17,10 +17,10 @@ SENSORS = ["rings16", "rings32", "rings64", "hemisphere", "rosette", "raster"]
 
 def wall(sensor: str = "rings64", tilt_deg: float = 0.0) -> tuple[RangeImage, Array]:
     """Image of a wall 10 m ahead (4 m high, 20 m wide) on open ground, and the pose T_world_sensor."""
-    world = worlds.World()
+    world = box_world.World()
     world.box(10.5, 0, (1.0, 20.0, 4.0))
-    pose = worlds.sensor_pose(0, 0, 1.5, 0, tilt_deg)
-    return RangeImage.of(worlds.scan(world, sensor, pose, np.random.default_rng(0)), np.zeros(3)), pose
+    pose = box_world.sensor_pose(0, 0, 1.5, 0, tilt_deg)
+    return RangeImage.of(box_world.scan(world, sensor, pose, np.random.default_rng(0)), np.zeros(3)), pose
 
 
 def look(image: RangeImage, pose: Array, x: float, y: float = 0.0, z: float = 1.5) -> int:
@@ -54,7 +54,7 @@ def test_outside_the_field_of_view_and_in_the_open_sky_nothing_is_known() -> Non
 
 @pytest.mark.parametrize(("rings", "gap_deg"), [("rings16", 2.0), ("rings32", 40 / 31), ("rings64", 28 / 63)])
 def test_resolution_is_that_of_the_rings_not_of_the_steps_along_them(rings: str, gap_deg: float) -> None:
-    found = np.degrees(angular_resolution(worlds.rays(rings, 1.0, np.random.default_rng(0))))
+    found = np.degrees(angular_resolution(box_world.rays(rings, 1.0, np.random.default_rng(0))))
     assert gap_deg / 1.5 < found < 2.0 * gap_deg
 
 
@@ -85,10 +85,10 @@ def test_a_ray_beside_a_narrow_thing_does_not_deny_it() -> None:
 
 @pytest.mark.parametrize("sensor", SENSORS)
 def test_a_cloud_hardly_contradicts_itself(sensor: str) -> None:
-    points = worlds.scan(
-        worlds.street(np.random.default_rng(2)),
+    points = box_world.scan(
+        box_world.street(np.random.default_rng(2)),
         sensor,
-        worlds.sensor_pose(0, 0, 1.8, 20),
+        box_world.sensor_pose(0, 0, 1.8, 20),
         np.random.default_rng(0),
     )
     states = RangeImage.of(points, np.zeros(3)).look(points, margin=0.3)

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 import hybridreg as hr
-from hybridreg import se3
-from hybridreg.verdict import views
-from hybridreg.verdict.relief import Alike, Relief, alike
+from hybridreg.evidence import views
+from hybridreg.geometry import se3
+from hybridreg.geometry.ground_relief import Alike, Relief, alike
 from tests.made_fields import field_pair
 
 

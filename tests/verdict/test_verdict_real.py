@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""On real pairs; `python -m benchmarks.verdict_rates` runs all of them, with poses refined by small_gicp."""
+"""On real pairs; `python -m hybridreg.verdict.training.rates` runs all of them, with poses refined by small_gicp."""
 
 from __future__ import annotations
 
@@ -9,14 +9,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hybridreg import se3
 from hybridreg.classical.voxel import VoxelGrid
 from hybridreg.cloud import PointCloud
+from hybridreg.evidence import views
+from hybridreg.geometry import se3
 from hybridreg.matches import Correspondences, Pose
 from hybridreg.pair import Pair
 from hybridreg.scene import Scene
-from hybridreg.verdict import judge, views
-from hybridreg.verdict.settle import settle
+from hybridreg.search.settle import settle
+from hybridreg.verdict import judge
 
 # Another sensor at another density, off the road, hanging sideways, and a plain street.
 PAIRS = ["opencalib-hesai1-qt201-to-p64", "rellis-vlp32-to-os64", "balm-os-40-to-0", "sustech-965-to-950"]

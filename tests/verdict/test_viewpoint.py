@@ -8,31 +8,31 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import worlds
 from typer.testing import CliRunner
 
 import hybridreg as hr
-from hybridreg import se3
 from hybridreg.cli import options
 from hybridreg.cli.app import app
-from hybridreg.data.folder import load_pair
-from hybridreg.range_image import RangeImages, Seen
+from hybridreg.data.hard import box_world
+from hybridreg.data.loaders.folder import load_pair
+from hybridreg.geometry import se3
+from hybridreg.geometry.range_image import RangeImages, Seen
 
 P = np.random.default_rng(0).normal(size=(500, 3)) * [5.0, 4.0, 2.0]
 
 
 def street_scan(z: float = 1.8, seed: int = 3, sensor: str = "rings32") -> np.ndarray:
-    world = worlds.street(np.random.default_rng(seed), crossing=True)
-    return worlds.scan(world, sensor, worlds.sensor_pose(0.0, 0.3, z, 20.0), np.random.default_rng(1))
+    world = box_world.street(np.random.default_rng(seed), crossing=True)
+    return box_world.scan(world, sensor, box_world.sensor_pose(0.0, 0.3, z, 20.0), np.random.default_rng(1))
 
 
 def fused_map(seed: int = 3) -> np.ndarray:
-    world = worlds.street(np.random.default_rng(seed), crossing=True)
+    world = box_world.street(np.random.default_rng(seed), crossing=True)
     rng = np.random.default_rng(2)
     scans = []
     for x in np.arange(-40.0, 41.0, 10.0):
-        T = worlds.sensor_pose(x, 0.0, 1.8, 0.0)
-        scans.append(se3.apply(T, worlds.scan(world, "rings32", T, rng, density=0.5)))
+        T = box_world.sensor_pose(x, 0.0, 1.8, 0.0)
+        scans.append(se3.apply(T, box_world.scan(world, "rings32", T, rng, density=0.5)))
     return np.vstack(scans)
 
 
@@ -43,8 +43,10 @@ def test_a_sensor_at_the_origin_is_found(sensor: str) -> None:
 
 
 def test_a_sensor_looks_forward_from_outside_its_points() -> None:
-    world = worlds.yard(np.random.default_rng(5))
-    scan = worlds.scan(world, "raster", worlds.sensor_pose(2.0, 0.0, 1.5, 25.0), np.random.default_rng(1))
+    world = box_world.yard(np.random.default_rng(5))
+    scan = box_world.scan(
+        world, "raster", box_world.sensor_pose(2.0, 0.0, 1.5, 25.0), np.random.default_rng(1)
+    )
     far = scan[scan[:, 0] > 8.0]
     assert far[:, 0].min() > 8.0
     assert np.array_equal(hr.PointCloud.of(far).viewpoint, np.zeros(3))

@@ -5,14 +5,14 @@
 >>> labelled = next(simulate.pairs(tier="mid", seed=1))
 """
 
+from hybridreg.data.simulate.difficulty import TIERS, Tier
 from hybridreg.data.simulate.drawn import Drawn, draw
-from hybridreg.data.simulate.folder import read_pair, write_pair, write_pairs
 from hybridreg.data.simulate.labelled import pair, pairs, to_labelled
-from hybridreg.data.simulate.overlaps import overlap
-from hybridreg.data.simulate.scenes import SCENES
-from hybridreg.data.simulate.sensors import SENSORS, Sensor
+from hybridreg.data.simulate.sensing.overlaps import overlap
+from hybridreg.data.simulate.sensing.sensors import SENSORS, Sensor
+from hybridreg.data.simulate.simulated_folder import read_pair, write_pair, write_pairs
 from hybridreg.data.simulate.splits import SPLITS, pair_number
-from hybridreg.data.simulate.tiers import TIERS, Tier
+from hybridreg.data.simulate.world.scenes import SCENES
 
 __all__ = [
     "SCENES",

@@ -8,19 +8,19 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from hybridreg import se3
-from hybridreg.data.simulate.camera import Camera, photograph
-from hybridreg.data.simulate.caster import Part, World
-from hybridreg.data.simulate.jpeg import encode
-from hybridreg.data.simulate.layout import Layout
-from hybridreg.data.simulate.light import Light
-from hybridreg.data.simulate.mesh import Mesh
-from hybridreg.data.simulate.overlaps import overlap, thin
-from hybridreg.data.simulate.scan import scan
-from hybridreg.data.simulate.scenes import SCENES
-from hybridreg.data.simulate.sensors import SENSORS, SOURCE_SENSORS, TARGET_SENSORS, Sensor
-from hybridreg.data.simulate.stands import Stand, choose_stands, single_stand
-from hybridreg.data.simulate.tiers import TIERS, Tier, tier_named
+from hybridreg.data.simulate.difficulty import TIERS, Tier, tier_named
+from hybridreg.data.simulate.sensing.camera import Camera, photograph
+from hybridreg.data.simulate.sensing.caster import Part, World
+from hybridreg.data.simulate.sensing.jpeg import encode
+from hybridreg.data.simulate.sensing.light import Light
+from hybridreg.data.simulate.sensing.overlaps import overlap, thin
+from hybridreg.data.simulate.sensing.scan import scan
+from hybridreg.data.simulate.sensing.sensors import SENSORS, SOURCE_SENSORS, TARGET_SENSORS, Sensor
+from hybridreg.data.simulate.sensing.stands import Stand, choose_stands, single_stand
+from hybridreg.data.simulate.world.layout import Layout
+from hybridreg.data.simulate.world.mesh import Mesh
+from hybridreg.data.simulate.world.scenes import SCENES
+from hybridreg.geometry import se3
 
 ATTEMPTS = 4
 

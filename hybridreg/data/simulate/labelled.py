@@ -8,10 +8,10 @@ from itertools import count
 
 from hybridreg.cloud import PointCloud
 from hybridreg.data.simulate.drawn import Drawn, draw
-from hybridreg.data.simulate.jpeg import decode
-from hybridreg.data.simulate.sensors import Sensor
+from hybridreg.data.simulate.sensing.jpeg import decode
+from hybridreg.data.simulate.sensing.sensors import Sensor
+from hybridreg.data.simulate.sensing.thinned import thinned
 from hybridreg.data.simulate.splits import pair_number
-from hybridreg.data.simulate.thinned import thinned
 from hybridreg.pair import LabelledPair, Pair
 
 

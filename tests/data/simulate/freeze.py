@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 
 from hybridreg.data.simulate import TIERS, draw, pair_number
-from hybridreg.data.simulate.jpeg import decode
+from hybridreg.data.simulate.sensing.jpeg import decode
 
 FROZEN = Path(__file__).with_name("frozen.json")
 LIBRARIES = ("numpy", "scipy", "open3d", "embreex", "opencv-python-headless")

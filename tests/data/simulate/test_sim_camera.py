@@ -5,10 +5,10 @@ import cv2
 import numpy as np
 
 from hybridreg.data.simulate import SCENES, Drawn
-from hybridreg.data.simulate.camera import ACROSS, UP, Camera, photograph
 from hybridreg.data.simulate.drawn import world_with
-from hybridreg.data.simulate.light import Light
-from hybridreg.data.simulate.stands import single_stand
+from hybridreg.data.simulate.sensing.camera import ACROSS, UP, Camera, photograph
+from hybridreg.data.simulate.sensing.light import Light
+from hybridreg.data.simulate.sensing.stands import single_stand
 
 
 def picture_of(jpeg: bytes) -> np.ndarray:

@@ -4,10 +4,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hybridreg.data.simulate import caster
-from hybridreg.data.simulate.caster import EmbreexCaster, Open3dCaster, Part, World
-from hybridreg.data.simulate.mesh import EMPTY, Mesh
-from hybridreg.data.simulate.solids import boxes, tubes
+from hybridreg.data.simulate.sensing import caster
+from hybridreg.data.simulate.sensing.caster import EmbreexCaster, Open3dCaster, Part, World
+from hybridreg.data.simulate.world.mesh import EMPTY, Mesh
+from hybridreg.data.simulate.world.solids import boxes, tubes
 
 
 def unit(rows: np.ndarray) -> np.ndarray:

@@ -6,8 +6,9 @@ from dataclasses import replace
 
 import pytest
 
-from hybridreg.data import YawStarts, open_dataset, simulate, simulated
+from hybridreg.data import YawStarts, open_dataset, simulate
 from hybridreg.data.dataset import fingerprint_of
+from hybridreg.data.loaders import simulated
 from hybridreg.data.simulate import TIERS, Drawn, pair_number
 
 

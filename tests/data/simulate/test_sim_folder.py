@@ -9,10 +9,10 @@ import pytest
 
 import hybridreg.data
 from hybridreg.data import simulate
-from hybridreg.data.simulate import Drawn, Sensor, folder
-from hybridreg.data.simulate.folder import read_pair, write_pair, write_pairs
-from hybridreg.data.simulate.overlaps import thin
-from hybridreg.data.simulate.thinned import step, thinned
+from hybridreg.data.simulate import Drawn, Sensor, simulated_folder
+from hybridreg.data.simulate.sensing.overlaps import thin
+from hybridreg.data.simulate.sensing.thinned import step, thinned
+from hybridreg.data.simulate.simulated_folder import read_pair, write_pair, write_pairs
 
 FACTS = {"id": "sim:train/mid/0/11", "tier": "mid", "seed": 0}
 
@@ -50,7 +50,7 @@ def test_a_pair_is_written_whole_or_not_at_all(
     def full_disk(*_: object, **__: object) -> None:
         raise OSError("disk full")
 
-    monkeypatch.setattr(folder, "_write_cloud", full_disk)
+    monkeypatch.setattr(simulated_folder, "_write_cloud", full_disk)
     with pytest.raises(OSError, match="disk full"):
         write_pair(tmp_path / "one", mid_pair, FACTS, None)
     assert list(tmp_path.iterdir()) == []
@@ -60,7 +60,7 @@ def test_runs_resume_and_workers_change_nothing(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, mid_pair: Drawn
 ) -> None:
     drawn: list[int] = []
-    monkeypatch.setattr(folder, "draw", lambda tier, number: drawn.append(number) or mid_pair)
+    monkeypatch.setattr(simulated_folder, "draw", lambda tier, number: drawn.append(number) or mid_pair)
     first = list(write_pairs(tmp_path, tier="mid", pairs=2, seed=4))
     again = list(write_pairs(tmp_path, tier="mid", pairs=3, seed=4))
     assert again[:2] == first

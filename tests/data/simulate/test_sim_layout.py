@@ -8,10 +8,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hybridreg.data.simulate import chance
-from hybridreg.data.simulate.ground import Terrain
-from hybridreg.data.simulate.scenes.scatter import in_box, spot
-from hybridreg.data.simulate.taken import Taken
+from hybridreg.data.simulate.world import chance
+from hybridreg.data.simulate.world.scenes.scatter import in_box, spot
+from hybridreg.data.simulate.world.taken import Taken
+from hybridreg.data.simulate.world.uneven_ground import Terrain
 
 SEEDS = st.integers(0, 2**32 - 1)
 

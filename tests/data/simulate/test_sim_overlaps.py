@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hybridreg import se3
-from hybridreg.data.simulate.overlaps import overlap, thin
+from hybridreg.data.simulate.sensing.overlaps import overlap, thin
+from hybridreg.geometry import se3
 
 
 @given(st.integers(0, 10_000), st.floats(0.05, 2.0))

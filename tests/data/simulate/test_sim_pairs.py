@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from joblib import Parallel, delayed
 
-from hybridreg import se3
 from hybridreg.data import simulate
 from hybridreg.data.simulate import TIERS, Drawn, Sensor, draw
-from hybridreg.data.simulate.overlaps import overlap, thin
+from hybridreg.data.simulate.sensing.overlaps import overlap, thin
+from hybridreg.geometry import se3
 
 
 def same(one: Drawn, other: Drawn) -> bool:

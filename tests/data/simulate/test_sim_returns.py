@@ -6,10 +6,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hybridreg.data.simulate.caster import Hits
-from hybridreg.data.simulate.materials import MATERIAL_INDEX
-from hybridreg.data.simulate.returns import measured_ranges
-from hybridreg.data.simulate.sensors import SENSORS
+from hybridreg.data.simulate.sensing.caster import Hits
+from hybridreg.data.simulate.sensing.returns import measured_ranges
+from hybridreg.data.simulate.sensing.sensors import SENSORS
+from hybridreg.data.simulate.world.materials import MATERIAL_INDEX
 
 SENSOR = SENSORS["hdl64e"]
 N = 6000

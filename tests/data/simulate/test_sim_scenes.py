@@ -4,11 +4,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hybridreg.data.simulate.layout import Layout
-from hybridreg.data.simulate.materials import MATERIALS
-from hybridreg.data.simulate.mesh import Mesh
-from hybridreg.data.simulate.scenes import DEGENERATE, SCENES, USUAL
-from hybridreg.data.simulate.stands import free_place
+from hybridreg.data.simulate.sensing.stands import free_place
+from hybridreg.data.simulate.world.layout import Layout
+from hybridreg.data.simulate.world.materials import MATERIALS
+from hybridreg.data.simulate.world.mesh import Mesh
+from hybridreg.data.simulate.world.scenes import DEGENERATE, SCENES, USUAL
 
 
 @pytest.fixture(scope="module", params=SCENES)

@@ -4,8 +4,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hybridreg.data.simulate.patterns import pattern
-from hybridreg.data.simulate.sensors import SENSORS, SOURCE_SENSORS, TARGET_SENSORS
+from hybridreg.data.simulate.sensing.patterns import pattern
+from hybridreg.data.simulate.sensing.sensors import SENSORS, SOURCE_SENSORS, TARGET_SENSORS
 
 
 def angles(name: str, seed: int = 0) -> tuple[np.ndarray, np.ndarray]:

@@ -10,13 +10,13 @@ import pytest
 import torch
 from four_pairs import four_pairs
 
-from hybridreg.learned.batch import make_batch
 from hybridreg.learned.cofinet.config import CofinetConfig, SelectionConfig, named_config
 from hybridreg.learned.cofinet.network import CofinetNetwork
 from hybridreg.learned.cofinet.patching import PatchIndex, patch_index
+from hybridreg.learned.cofinet.point_transport import MASKED, alternating_sinkhorn, either_best
 from hybridreg.learned.cofinet.selection import select
 from hybridreg.learned.cofinet.targets import compute_targets, fine_truth, node_weights
-from hybridreg.learned.cofinet.transport import MASKED, alternating_sinkhorn, either_best
+from hybridreg.learned.cross3dreg.batch import make_batch
 
 
 def test_the_slack_is_not_normalised_along_itself() -> None:

@@ -12,14 +12,14 @@ import torch
 from stacked_recordings import backbone_plan, gradients, inputs, made_batch, true_points, unsettle, write
 from torch import Tensor
 
-from hybridreg.learned.cofinet.attention import scores
 from hybridreg.learned.cofinet.network import CofinetNetwork
 from hybridreg.learned.cofinet.official_names import official_name
+from hybridreg.learned.cofinet.point_transport import MASKED
 from hybridreg.learned.cofinet.selection import select
 from hybridreg.learned.cofinet.targets import compute_targets, training_patches, true_pairs
-from hybridreg.learned.cofinet.transport import MASKED
-from hybridreg.learned.neighbors import pairs_within
-from hybridreg.learned.patches import build_patches
+from hybridreg.learned.cofinet.transformer import scores
+from hybridreg.learned.pyramid.neighbors import pairs_within
+from hybridreg.learned.pyramid.patches import build_patches
 
 BLOCKS = ["self", "cross", "self"]
 
@@ -200,7 +200,7 @@ def test_what_one_would_guess_wrong_is_noticed(
     import recorded_cofinet
 
     from hybridreg.learned.cofinet import network
-    from hybridreg.learned.sinkhorn import log_sinkhorn
+    from hybridreg.learned.matching.sinkhorn import log_sinkhorn
 
     built = recorded_cofinet.network_config
     if change == "transport":

@@ -14,7 +14,7 @@ from measured import peak_and_estimate
 
 import hybridreg as hr
 from hybridreg import testing
-from hybridreg.learned import memory
+from hybridreg.learned import memory_estimate
 from hybridreg.learned.fcgf.config import named_config
 from hybridreg.learned.fcgf.network import FcgfNetwork
 from hybridreg.learned.fcgf.official_names import official_name
@@ -123,7 +123,7 @@ def test_another_spacing_is_told(scene: Scene, trained: str) -> None:
 
 
 def test_what_does_not_fit_is_refused(scene: Scene, trained: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(memory, "available_bytes", lambda device: 10**6)
+    monkeypatch.setattr(memory_estimate, "available_bytes", lambda device: 10**6)
     with pytest.raises(ValueError, match=r"target and \d+ source points.*larger than 0.5 m, or crop"):
         hr.Fcgf(weights=trained)(scene, full(scene))
 
@@ -149,4 +149,4 @@ batch = make_batch(*clouds, network.config)
 def test_the_estimate_of_memory_is_near_and_not_below() -> None:
     real, estimate = peak_and_estimate(_MADE)
     assert real <= estimate
-    assert estimate - memory.SLACK <= 1.4 * real
+    assert estimate - memory_estimate.SLACK <= 1.4 * real

@@ -11,11 +11,11 @@ from pathlib import Path
 import pytest
 import torch
 
+from hybridreg.learned.cross3dreg.network import RegistrationNetwork
 from hybridreg.learned.fcgf.batch import FcgfBatch
 from hybridreg.learned.fcgf.config import FcgfConfig, FcgfLossConfig, named_config
 from hybridreg.learned.fcgf.network import FcgfNetwork
 from hybridreg.learned.fcgf.official_names import official_name
-from hybridreg.learned.network import RegistrationNetwork
 from hybridreg.learned.weights import from_pretrained
 
 

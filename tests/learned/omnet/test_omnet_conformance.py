@@ -16,8 +16,8 @@ import torch
 from omnet_pairs import shapes
 
 from hybridreg.learned.omnet.losses import step_labels
-from hybridreg.learned.omnet.metrics import pose_errors
 from hybridreg.learned.omnet.network import OmnetNetwork, OmnetOutput
+from hybridreg.learned.omnet.published_errors import pose_errors
 from hybridreg.learned.omnet.quaternions import matrix_of
 from hybridreg.learned.omnet.targets import compute_targets
 

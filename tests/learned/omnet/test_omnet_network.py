@@ -13,8 +13,8 @@ from scipy.spatial.transform import Rotation
 from hybridreg.learned.omnet.batch import OmnetBatch, make_batch
 from hybridreg.learned.omnet.config import OmnetConfig, OmnetLossConfig, named_config
 from hybridreg.learned.omnet.losses import mask_loss, quaternion_loss
-from hybridreg.learned.omnet.metrics import pose_errors
 from hybridreg.learned.omnet.network import OmnetNetwork
+from hybridreg.learned.omnet.published_errors import pose_errors
 from hybridreg.learned.omnet.quaternions import compose, matrix_of, multiply, pose_of, rotate
 from hybridreg.learned.omnet.targets import compute_targets, overlap_labels
 

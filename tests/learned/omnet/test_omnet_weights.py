@@ -16,7 +16,7 @@ from omnet_pairs import shapes
 
 import hybridreg as hr
 from hybridreg import testing
-from hybridreg.learned import memory
+from hybridreg.learned import memory_estimate
 from hybridreg.learned.fcgf.network import FcgfNetwork
 from hybridreg.learned.omnet.batch import OmnetBatch
 from hybridreg.learned.omnet.config import OmnetConfig, named_config
@@ -150,7 +150,7 @@ def test_a_published_checkpoint_is_a_stage(trained: str, tmp_path: Path) -> None
 
 def test_what_does_not_fit_is_refused(trained: str, monkeypatch: pytest.MonkeyPatch) -> None:
     scene, _ = testing.sample_scene()
-    monkeypatch.setattr(memory, "available_bytes", lambda device: 10**6)
+    monkeypatch.setattr(memory_estimate, "available_bytes", lambda device: 10**6)
     with pytest.raises(ValueError, match="256 target and 256 source points.*look at fewer with points="):
         hr.OmNet(weights=trained)(scene, Correspondences.none(), np.random.default_rng(0))
 
@@ -167,4 +167,4 @@ batch = OmnetBatch(source=torch.randn(2, 6000, 3), target=torch.randn(2, 6000, 3
 def test_the_estimate_of_memory_is_near_and_not_below() -> None:
     real, estimate = peak_and_estimate(_MADE)
     assert real <= estimate
-    assert estimate - memory.SLACK <= 1.5 * real, (real, estimate)
+    assert estimate - memory_estimate.SLACK <= 1.5 * real, (real, estimate)

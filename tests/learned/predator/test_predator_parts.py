@@ -10,18 +10,18 @@ import torch
 from four_pairs import four_pairs
 from torch.nn import functional as F
 
-from hybridreg.learned.blocks import PointInstanceNorm
-from hybridreg.learned.circle_loss import circle
-from hybridreg.learned.instance_norm import instance_norm
-from hybridreg.learned.kpfcnn import KpfcnnDecoder
-from hybridreg.learned.kpfcnn_config import KpfcnnConfig, architecture
-from hybridreg.learned.message_attention import InterleavedAttention, MessageBlock
-from hybridreg.learned.neighbors import pairs_within
+from hybridreg.learned.kpfcnn.kpfcnn import KpfcnnDecoder
+from hybridreg.learned.kpfcnn.kpfcnn_config import KpfcnnConfig, architecture
+from hybridreg.learned.layers.instance_norm import instance_norm
+from hybridreg.learned.layers.kpconv_blocks import PointInstanceNorm
+from hybridreg.learned.layers.message_attention import InterleavedAttention, MessageBlock
+from hybridreg.learned.losses.circle_loss import circle
 from hybridreg.learned.predator.config import GraphConfig, PredatorConfig, PredatorLossConfig, named_config
 from hybridreg.learned.predator.graph import EdgeConvolution, GraphLayer, nearest_others
 from hybridreg.learned.predator.losses import predator_losses
 from hybridreg.learned.predator.network import PredatorCloud, PredatorNetwork
 from hybridreg.learned.predator.targets import PredatorTargets, compute_targets
+from hybridreg.learned.pyramid.neighbors import pairs_within
 
 
 def test_edges_are_centre_and_difference() -> None:
@@ -228,7 +228,7 @@ def test_the_decoder_halves_what_it_is_given() -> None:
 
 
 def test_clouds_of_a_few_points_get_through() -> None:
-    from hybridreg.learned.batch import make_batch
+    from hybridreg.learned.cross3dreg.batch import make_batch
 
     network = PredatorNetwork(named_config("nano")).eval()
     for n, m in ((1, 1), (1, 30), (12, 3)):

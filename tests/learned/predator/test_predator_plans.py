@@ -11,12 +11,12 @@ import pytest
 import torch
 from stacked_recordings import backbone_plan, gradients, inputs, made_batch, true_points, unsettle, write
 
-from hybridreg.learned.neighbors import pairs_within
 from hybridreg.learned.predator.graph import nearest_others
 from hybridreg.learned.predator.losses import saliency_weight
 from hybridreg.learned.predator.network import PredatorNetwork
 from hybridreg.learned.predator.official_names import official_name
 from hybridreg.learned.predator.targets import compute_targets
+from hybridreg.learned.pyramid.neighbors import pairs_within
 
 THREE = ["simple", "resnetb_strided", "resnetb", "resnetb_strided"]
 UP = ["nearest_upsample", "unary", "nearest_upsample", "last_unary"]
@@ -161,7 +161,7 @@ def test_what_one_would_guess_wrong_is_noticed(
 ) -> None:
     import recorded_predator
 
-    from hybridreg.learned import blocks, message_attention
+    from hybridreg.learned.layers import kpconv_blocks, message_attention
     from hybridreg.learned.predator import losses
 
     if change == "heads":
@@ -178,12 +178,12 @@ def test_what_one_would_guess_wrong_is_noticed(
 
         monkeypatch.setattr(message_attention.MessageBlock, "forward", together)
     elif change == "norm":
-        plain = blocks.PointInstanceNorm.forward
+        plain = kpconv_blocks.PointInstanceNorm.forward
 
         def per_cloud(self, features, lengths, slope=1.0):  # type: ignore[no-untyped-def]
             return torch.cat([plain(self, part, lengths, slope) for part in features.split(list(lengths))])
 
-        monkeypatch.setattr(blocks.PointInstanceNorm, "forward", per_cloud)
+        monkeypatch.setattr(kpconv_blocks.PointInstanceNorm, "forward", per_cloud)
     else:
         circle = losses.circle
         monkeypatch.setattr(

@@ -6,10 +6,10 @@ from __future__ import annotations
 import numpy as np
 import torch
 
-from hybridreg import se3
+from hybridreg.geometry import se3
 from hybridreg.learned.roitr.batch import RoitrBatch
 from hybridreg.learned.roitr.config import RoitrConfig
-from hybridreg.learned.roitr.levels import build_levels
+from hybridreg.learned.roitr.point_levels import build_levels
 
 
 def bush(

@@ -10,11 +10,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial import cKDTree
 
-from hybridreg import se3
+from hybridreg.geometry import se3
 from hybridreg.learned.roitr.batch import make_batch, oriented_normals
 from hybridreg.learned.roitr.config import named_config
-from hybridreg.learned.roitr.levels import build_levels, farthest_points, nearest_others
 from hybridreg.learned.roitr.pair_features import pair_features
+from hybridreg.learned.roitr.point_levels import build_levels, farthest_points, nearest_others
 
 NANO = named_config("nano")
 

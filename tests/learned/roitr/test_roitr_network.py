@@ -14,17 +14,17 @@ import torch
 from bushes import bush
 from measured import peak_and_estimate
 
-from hybridreg import se3
-from hybridreg.learned.memory import SLACK
-from hybridreg.learned.network import RegistrationNetwork
+from hybridreg.geometry import se3
+from hybridreg.learned.cross3dreg.network import RegistrationNetwork
+from hybridreg.learned.memory_estimate import SLACK
 from hybridreg.learned.roitr.batch import RoitrBatch
 from hybridreg.learned.roitr.config import RoitrConfig, named_config
-from hybridreg.learned.roitr.levels import build_levels
 from hybridreg.learned.roitr.local_attention import LocalAttention
 from hybridreg.learned.roitr.losses import right_shares
-from hybridreg.learned.roitr.matching import match_adaptively
 from hybridreg.learned.roitr.network import RoitrNetwork
 from hybridreg.learned.roitr.official_names import official_name, unused_names
+from hybridreg.learned.roitr.point_levels import build_levels
+from hybridreg.learned.roitr.superpoint_pairs import match_adaptively
 from hybridreg.learned.roitr.targets import compute_targets
 
 NANO = named_config("nano")

@@ -16,17 +16,17 @@ import pytest
 import torch
 from bushes import bush
 
-from hybridreg.learned.distances import squared_distances
-from hybridreg.learned.network import CloudEncoding
-from hybridreg.learned.procrustes import weighted_procrustes
-from hybridreg.learned.roitr.backbone import LevelFeatures
-from hybridreg.learned.roitr.levels import Levels
+from hybridreg.learned.cross3dreg.network import CloudEncoding
+from hybridreg.learned.geotransformer.structure_embedding import neighbor_angles
+from hybridreg.learned.layers.distances import squared_distances
+from hybridreg.learned.matching.procrustes import weighted_procrustes
+from hybridreg.learned.roitr.encoder_decoder import LevelFeatures
 from hybridreg.learned.roitr.losses import right_shares, validation_losses
-from hybridreg.learned.roitr.matching import match_adaptively
 from hybridreg.learned.roitr.network import RoitrNetwork
 from hybridreg.learned.roitr.official_names import official_name, unused_names
+from hybridreg.learned.roitr.point_levels import Levels
+from hybridreg.learned.roitr.superpoint_pairs import match_adaptively
 from hybridreg.learned.roitr.targets import compute_targets, visible_shares
-from hybridreg.learned.structure_embedding import neighbor_angles
 
 Values = dict[str, torch.Tensor]
 MARGINS = {"positive_margin": 0.1, "negative_margin": 1.4, "positive_optimal": 0.1, "negative_optimal": 1.4}

@@ -100,7 +100,7 @@ def test_another_voxel_and_too_many_points_are_told(shifted: Pair, tmp_path: Pat
 def test_too_large_a_pair_is_refused(shifted: Pair, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     scene = hr.VoxelGrid(voxel=0.5)(shifted)
     stage = hr.Roitr(weights=trained(tmp_path))
-    monkeypatch.setattr("hybridreg.learned.memory.available_bytes", lambda device: 10**6)
+    monkeypatch.setattr("hybridreg.learned.memory_estimate.available_bytes", lambda device: 10**6)
     counts = f"{len(scene.target)} target and {len(scene.source)} source points"
     with pytest.raises(ValueError, match=rf"{counts}.*voxel larger than 0.5 m, or crop"):
         stage(scene, Overlap.full(len(scene.source), len(scene.target)))

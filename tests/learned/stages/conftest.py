@@ -10,9 +10,10 @@ import numpy as np
 import pytest
 import torch
 
-from hybridreg import se3, testing
-from hybridreg.learned.config import NetworkConfig
-from hybridreg.learned.network import RegistrationNetwork
+from hybridreg import testing
+from hybridreg.geometry import se3
+from hybridreg.learned.cross3dreg.config import NetworkConfig
+from hybridreg.learned.cross3dreg.network import RegistrationNetwork
 from hybridreg.learned.weights import save_pretrained
 from hybridreg.pair import Pair
 

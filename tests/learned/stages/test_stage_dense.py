@@ -10,9 +10,10 @@ import numpy as np
 import pytest
 
 import hybridreg as hr
-from hybridreg import se3, testing
-from hybridreg.learned.config import NetworkConfig
-from hybridreg.learned.sizes import named_config
+from hybridreg import testing
+from hybridreg.geometry import se3
+from hybridreg.learned.cross3dreg.config import NetworkConfig
+from hybridreg.learned.cross3dreg.sizes import named_config
 from hybridreg.matches import Overlap
 from hybridreg.pair import Pair
 

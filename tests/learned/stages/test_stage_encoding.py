@@ -14,9 +14,9 @@ from hypothesis import strategies as st
 
 import hybridreg as hr
 from hybridreg import testing
-from hybridreg.learned.batch import make_batch
-from hybridreg.learned.network import Encoding, RegistrationNetwork
-from hybridreg.learned.sizes import named_config
+from hybridreg.learned.cross3dreg.batch import make_batch
+from hybridreg.learned.cross3dreg.network import Encoding, RegistrationNetwork
+from hybridreg.learned.cross3dreg.sizes import named_config
 from hybridreg.learned.stages.spreading import gather, spread
 from hybridreg.matches import Overlap
 from hybridreg.scene import Scene

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 import hybridreg as hr
-from hybridreg import ground, se3
-from hybridreg.eval import metrics
+from hybridreg.eval.score import metrics
+from hybridreg.geometry import ground, se3
 from hybridreg.learned.stages import encoding
 from hybridreg.learned.stages.levelling import Turns, likeness
 from hybridreg.pair import LabelledPair, Pair

@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 import hybridreg as hr
-from hybridreg import se3, testing
+from hybridreg import testing
+from hybridreg.geometry import se3
 from hybridreg.matches import Correspondences
 from hybridreg.scene import Scene
 

@@ -11,10 +11,11 @@ import pytest
 import torch
 
 import hybridreg as hr
-from hybridreg import se3, testing
-from hybridreg._open3d import load_open3d
-from hybridreg.learned.sizes import named_config
+from hybridreg import testing
+from hybridreg.geometry import se3
+from hybridreg.learned.cross3dreg.sizes import named_config
 from hybridreg.matches import Correspondences, Overlap
+from hybridreg.runtime.open3d import load_open3d
 from hybridreg.scene import Scene
 
 OVERLAPS = {"none": "none", "visibility": "visibility", "omp": hr.Omp(untrained=True)}

@@ -144,9 +144,9 @@ def test_numbers_that_cannot_be_are_refused(cls: Any) -> None:
 
 
 def test_too_large_a_pair_is_refused(weights: dict[str, str], monkeypatch: pytest.MonkeyPatch) -> None:
-    from hybridreg.learned import memory
+    from hybridreg.learned import memory_estimate
 
-    monkeypatch.setattr(memory, "available_bytes", lambda device: 10**6)
+    monkeypatch.setattr(memory_estimate, "available_bytes", lambda device: 10**6)
     scene, _ = testing.sample_scene()
     for stage in (hr.PredatorOverlap(weights=weights["predator"]), hr.Cofinet(weights=weights["cofinet"])):
         arguments = (

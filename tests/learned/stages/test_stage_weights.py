@@ -14,9 +14,9 @@ import torch
 
 import hybridreg as hr
 from hybridreg import testing
-from hybridreg.learned.network import RegistrationNetwork
-from hybridreg.learned.official_names import official_name
-from hybridreg.learned.sizes import named_config
+from hybridreg.learned.cross3dreg.network import RegistrationNetwork
+from hybridreg.learned.cross3dreg.sizes import named_config
+from hybridreg.learned.geotransformer.official_names import official_name
 from hybridreg.learned.stages import networks
 from hybridreg.learned.untrained import untrained_parts
 from hybridreg.matches import Overlap

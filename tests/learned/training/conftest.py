@@ -11,7 +11,7 @@ from training_runs import WARM_UP, MakeRecipe, Run, options, write_pair
 
 from hybridreg.learned.training import recipe_file
 from hybridreg.learned.training.recipe import Recipe
-from hybridreg.learned.training.run import train
+from hybridreg.learned.training.training_run import train
 
 
 @pytest.fixture(scope="session")

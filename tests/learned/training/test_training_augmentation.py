@@ -11,13 +11,13 @@ import pytest
 import torch
 from training_runs import MakeRecipe
 
-from hybridreg.learned.procrustes import apply_transform
-from hybridreg.learned.targets import compute_targets
-from hybridreg.learned.training.augmentation import Augmentation, draw_motions, relight
-from hybridreg.learned.training.pair_source import open_source
-from hybridreg.learned.training.prepared import PreparedPair, true_partners
+from hybridreg.learned.cross3dreg.targets import compute_targets
+from hybridreg.learned.matching.procrustes import apply_transform
+from hybridreg.learned.training.data.augmentation import Augmentation, draw_motions, relight
+from hybridreg.learned.training.data.pair_source import open_source
+from hybridreg.learned.training.data.prepared import PreparedPair, true_partners
+from hybridreg.learned.training.data.samples import augment, undisturbed
 from hybridreg.learned.training.recipe import Recipe
-from hybridreg.learned.training.samples import augment, undisturbed
 
 STILL = Augmentation(jitter=0.0, light=0.0)
 

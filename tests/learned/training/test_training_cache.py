@@ -11,11 +11,11 @@ import pytest
 import torch
 from training_runs import MakeRecipe, write_pair
 
-from hybridreg.learned.training import pair_source, preparing
-from hybridreg.learned.training.pair_source import PairSource, open_source
-from hybridreg.learned.training.preparing import prepare_all
+from hybridreg.learned.training.data import pair_source, preparing
+from hybridreg.learned.training.data.pair_source import PairSource, open_source
+from hybridreg.learned.training.data.preparing import prepare_all
+from hybridreg.learned.training.data.tensor_cache import TensorCache
 from hybridreg.learned.training.recipe import Source
-from hybridreg.learned.training.tensor_cache import TensorCache
 
 
 @pytest.fixture

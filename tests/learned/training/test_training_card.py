@@ -13,7 +13,7 @@ from training_runs import Run, log
 from hybridreg.data import open_dataset
 from hybridreg.data.dataset import fingerprint_of
 from hybridreg.learned.training import recipe_file
-from hybridreg.learned.training.pair_source import open_source
+from hybridreg.learned.training.data.pair_source import open_source
 from hybridreg.learned.training.validation import Validation, rank, validate
 from hybridreg.learned.weights import from_pretrained
 

@@ -11,10 +11,10 @@ import torch
 from training_runs import MakeRecipe, log, options, state
 
 from hybridreg.learned.training import loop
-from hybridreg.learned.training.augmentation import Augmentation
-from hybridreg.learned.training.frozen import lasting
+from hybridreg.learned.training.data.augmentation import Augmentation
+from hybridreg.learned.training.data.frozen import lasting
 from hybridreg.learned.training.recipe import Phase, Recipe
-from hybridreg.learned.training.run import train
+from hybridreg.learned.training.training_run import train
 
 UPRIGHT = {"tilt": 0.0, "jitter": 0.0}
 FROZEN = {"name": "heads", "steps": 6, "rate": 1e-3, "backbone_rate": 0.0}
@@ -53,7 +53,7 @@ def test_kept_features_train_the_same_heads(
 
 
 def test_the_backbone_stays(make_recipe: MakeRecipe, cache: Path, tmp_path: Path) -> None:
-    from hybridreg.learned.training.start import first_network
+    from hybridreg.learned.training.initial_weights import first_network
 
     recipe = heads(make_recipe)
     before = first_network(recipe).state_dict()

@@ -10,7 +10,7 @@ import torch
 from torch import Tensor
 from torch.nn import functional as F
 
-from hybridreg.learned.infonce_loss import InfoNceConfig, infonce
+from hybridreg.learned.losses.infonce_loss import InfoNceConfig, infonce
 
 VOXEL = 0.5
 

@@ -18,15 +18,16 @@ import torch
 from training_runs import MakeRecipe, Run, environment, options, same, state, write_pair, write_recipe
 
 from hybridreg.io.lock import InUse, folder_lock
-from hybridreg.learned.training import checkpoint, pair_source, samples
+from hybridreg.learned.training import checkpoint
 from hybridreg.learned.training.checkpoint import Progress
-from hybridreg.learned.training.log import CurveFile
-from hybridreg.learned.training.pair_source import open_source
-from hybridreg.learned.training.preparing import prepare_all
+from hybridreg.learned.training.curve_files import CurveFile
+from hybridreg.learned.training.data import pair_source, samples
+from hybridreg.learned.training.data.pair_source import open_source
+from hybridreg.learned.training.data.preparing import prepare_all
+from hybridreg.learned.training.data.tensor_cache import NotKept
 from hybridreg.learned.training.recipe import Recipe, Source
 from hybridreg.learned.training.resuming import tell_changed_data
-from hybridreg.learned.training.run import train
-from hybridreg.learned.training.tensor_cache import NotKept
+from hybridreg.learned.training.training_run import train
 
 
 def test_a_folder_in_which_another_trains_is_refused(whole: Run, cache: Path, tmp_path: Path) -> None:
@@ -168,7 +169,7 @@ def test_where_no_process_can_be_started_samples_are_read_here(
 
 def phase_samples(recipe: Recipe, cache: Path) -> samples.PhaseSamples:
     """Samples of the recipe's training source."""
-    from hybridreg.learned.training.order import Order
+    from hybridreg.learned.training.data.order import Order
 
     source = open_source(replace(recipe.data.train[0]), recipe, cache)
     return samples.PhaseSamples([source], Order([len(source)], [1.0], 4, (0, 0)), recipe.augmentation, (0, 0))

@@ -15,12 +15,13 @@ import pytest
 import torch
 from training_runs import log, options, same, state
 
-from hybridreg import se3, testing
+from hybridreg import testing
+from hybridreg.geometry import se3
 from hybridreg.learned.network_table import DEFAULT, NETWORKS, network_class
 from hybridreg.learned.training import checkpoint, loop, recipe_file
-from hybridreg.learned.training.examples import learn
+from hybridreg.learned.training.data.training_examples import learn
 from hybridreg.learned.training.objective import Outcome
-from hybridreg.learned.training.run import train
+from hybridreg.learned.training.training_run import train
 from hybridreg.learned.true_pair import TruePair
 from hybridreg.learned.weights import from_pretrained
 

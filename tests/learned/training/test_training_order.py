@@ -12,9 +12,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from training_runs import MakeRecipe
 
-from hybridreg.learned.training.order import Order
-from hybridreg.learned.training.pair_source import open_source
-from hybridreg.learned.training.samples import PhaseSamples, Sample, stream
+from hybridreg.learned.training.data.order import Order
+from hybridreg.learned.training.data.pair_source import open_source
+from hybridreg.learned.training.data.samples import PhaseSamples, Sample, stream
 
 SIZES = st.lists(st.integers(1, 9), min_size=1, max_size=4)
 

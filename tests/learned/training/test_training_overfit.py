@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from training_runs import WARM_UP, MakeRecipe, log, options
 
-from hybridreg.learned.training.run import train
+from hybridreg.learned.training.training_run import train
 
 
 def test_sixteen_steps_overfit_a_pair(make_recipe: MakeRecipe, cache: Path, tmp_path: Path) -> None:

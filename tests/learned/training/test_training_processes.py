@@ -14,7 +14,7 @@ from training_runs import WARM_UP, environment, log, options, state, write_recip
 
 from hybridreg.learned.training import recipe_file
 from hybridreg.learned.training.processes import start_processes
-from hybridreg.learned.training.run import train
+from hybridreg.learned.training.training_run import train
 
 
 def test_two_gloo_processes_equal_one(content: dict[str, Any], cache: Path, tmp_path: Path) -> None:
@@ -78,6 +78,6 @@ def test_more_processes_than_cards_share_them(
 
 def state_of_a_fresh_network(file: Path) -> dict[str, torch.Tensor]:
     """Where both runs began."""
-    from hybridreg.learned.training.start import first_network
+    from hybridreg.learned.training.initial_weights import first_network
 
     return first_network(recipe_file.read(file)).state_dict()

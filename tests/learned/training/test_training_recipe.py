@@ -14,7 +14,8 @@ from typer.testing import CliRunner
 
 from hybridreg.cli.app import app
 from hybridreg.learned import recipes
-from hybridreg.learned.training import data_choice, recipe_file
+from hybridreg.learned.training import recipe_file
+from hybridreg.learned.training.data import data_choice
 from hybridreg.learned.training.recipe import Phase
 from hybridreg.learned.training.schedule import rate_at, steps_of
 

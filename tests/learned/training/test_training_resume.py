@@ -16,7 +16,7 @@ from training_runs import MakeRecipe, Run, environment, log, options, same, stat
 
 from hybridreg.learned.training import checkpoint, loop
 from hybridreg.learned.training.objective import Outcome
-from hybridreg.learned.training.run import train
+from hybridreg.learned.training.training_run import train
 
 
 def killed_after(lines: int, recipe: Path, out: Path, cache: Path) -> int:

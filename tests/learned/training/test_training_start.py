@@ -11,9 +11,9 @@ import pytest
 import torch
 from training_runs import MakeRecipe
 
-from hybridreg.learned.network import RegistrationNetwork
-from hybridreg.learned.sizes import named_config
-from hybridreg.learned.training.start import first_network
+from hybridreg.learned.cross3dreg.network import RegistrationNetwork
+from hybridreg.learned.cross3dreg.sizes import named_config
+from hybridreg.learned.training.initial_weights import first_network
 from hybridreg.learned.weights import save_pretrained
 
 
@@ -30,7 +30,7 @@ def test_a_warm_backbone_is_taken_over(
     make_recipe: MakeRecipe, warm: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     fresh = first_network(make_recipe()).state_dict()
-    with caplog.at_level(logging.INFO, logger="hybridreg.learned.training.start"):
+    with caplog.at_level(logging.INFO, logger="hybridreg.learned.training.initial_weights"):
         started = first_network(make_recipe(start=str(warm)))
     torch.manual_seed(9)
     known = RegistrationNetwork(named_config("nano")).state_dict()

@@ -18,7 +18,7 @@ from training_runs import WARM_UP, MakeRecipe, log, options, same, state
 from hybridreg.learned.training import loop
 from hybridreg.learned.training.objective import Outcome
 from hybridreg.learned.training.processes import start_processes
-from hybridreg.learned.training.run import train
+from hybridreg.learned.training.training_run import train
 
 PHASE = {"name": "warm-up", "steps": 4, "rate": 1e-3, "losses": WARM_UP}
 
@@ -95,7 +95,7 @@ def test_one_bad_pair_spoils_its_whole_batch_and_is_named_alone(
 def test_a_pair_that_breaks_while_it_is_read_is_a_skipped_step(
     make_recipe: MakeRecipe, cache: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from hybridreg.learned.training.pair_source import PairSource
+    from hybridreg.learned.training.data.pair_source import PairSource
 
     true_load = PairSource.load
 

@@ -18,7 +18,7 @@ import torch
 from hybridreg import testing
 from hybridreg.learned.training import checkpoint
 from hybridreg.learned.training.recipe import Recipe
-from hybridreg.learned.training.run import RunOptions
+from hybridreg.learned.training.training_run import RunOptions
 
 ROOT = Path(__file__).resolve().parents[3]
 WARM_UP = {"infonce": 1.0, "coarse": 0.0, "fine": 0.0, "mask": 0.0}

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 import torch
 
-from hybridreg import se3
+from hybridreg.geometry import se3
 from hybridreg.learned.vrhcf.batch import make_batch
 from hybridreg.learned.vrhcf.config import named_config
-from hybridreg.learned.vrhcf.frames import reference_axes, upright_rotations
-from hybridreg.learned.vrhcf.patches import build_patches
-from hybridreg.learned.vrhcf.voxels import counts, spherical, voxels
+from hybridreg.learned.vrhcf.keypoint_patches import build_patches
+from hybridreg.learned.vrhcf.spherical_voxels import counts, spherical, voxels
+from hybridreg.learned.vrhcf.upright_frames import reference_axes, upright_rotations
 
 GRID = (5, 8, 4)
 

@@ -16,8 +16,8 @@ from streets import moved, street, yaw
 
 from hybridreg.learned.vrhcf.config import ShellConv, SphereNetConfig, SurfaceConv, named_config
 from hybridreg.learned.vrhcf.cost import SLACK, multiply_adds
+from hybridreg.learned.vrhcf.keypoint_matching import match_descriptors
 from hybridreg.learned.vrhcf.losses import hardest_in_batch
-from hybridreg.learned.vrhcf.matching import match_descriptors
 from hybridreg.learned.vrhcf.network import SphereNet, pad_sphere
 from hybridreg.learned.vrhcf.official_names import UNUSED, official_names
 from hybridreg.learned.vrhcf.targets import training_batch

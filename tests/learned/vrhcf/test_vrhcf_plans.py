@@ -13,16 +13,16 @@ import torch
 from streets import street
 from torch.nn import functional as F
 
-from hybridreg import se3
 from hybridreg.classical.compatibility import first_order, leading_eigenvectors, pick_seeds, second_order
 from hybridreg.classical.consensus_sets import filter_sets, first_sets, set_poses, set_weights
+from hybridreg.geometry import se3
 from hybridreg.learned.vrhcf.batch import SphereBatch, make_batch
-from hybridreg.learned.vrhcf.frames import reference_axes
+from hybridreg.learned.vrhcf.keypoint_matching import match_descriptors
 from hybridreg.learned.vrhcf.losses import distances, hardest_in_batch
-from hybridreg.learned.vrhcf.matching import match_descriptors
 from hybridreg.learned.vrhcf.network import SphereNet
 from hybridreg.learned.vrhcf.official_names import UNUSED, official_names
-from hybridreg.learned.vrhcf.voxels import counts, spherical
+from hybridreg.learned.vrhcf.spherical_voxels import counts, spherical
+from hybridreg.learned.vrhcf.upright_frames import reference_axes
 
 Values = dict[str, Any]
 

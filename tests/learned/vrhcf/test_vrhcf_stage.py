@@ -122,7 +122,7 @@ def test_wrong_fields_and_weights_are_refused(tmp_path: Path) -> None:
 
 
 def test_too_little_memory_is_told(shifted: Pair, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("hybridreg.learned.memory.available_bytes", lambda device="cpu": 10**6)
+    monkeypatch.setattr("hybridreg.learned.memory_estimate.available_bytes", lambda device="cpu": 10**6)
     scene = hr.VoxelGrid(voxel=0.5)(shifted)
     with pytest.raises(ValueError, match=r"60 target and 60 source points.*max_keypoints"):
         STAGE(scene, full(scene))

@@ -1,2 +1,0 @@
-# SPDX-License-Identifier: MIT
-"""Hostile inputs, one kind a file: what `benchmarks.fuzz` draws, and the process in which it is tried."""

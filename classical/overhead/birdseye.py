@@ -1,0 +1,212 @@
+# SPDX-License-Identifier: MIT
+"""Pose from above: both clouds levelled by their ground, laid on one another at every yaw and shift."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hybridreg.classical.overhead.overhead_columns import FromAbove, from_above
+from hybridreg.classical.overhead.planar_climb import climb
+from hybridreg.classical.overhead.sweep import sweep
+from hybridreg.geometry import ground, se3
+from hybridreg.geometry.ground import Ground
+from hybridreg.matches import Correspondences, Pose
+from hybridreg.resolution import map_cell
+from hybridreg.scene import Level, Scene, centre
+from hybridreg.search.rivals import BEYOND_DOUBT, Rival, best_first, distinct, highest
+from hybridreg.stage import Stage
+from hybridreg.verdict.confidence import NEARLY
+
+Array = NDArray[np.float64]
+Side = Literal["source", "target"]
+
+# In voxels: the coarse map's cell, how far from the sensor points are used. Two such clouds fit in the largest map.
+_COARSE, _REACH = 3.0, 175.0
+# Degrees between yaws; the share of the best peak's score that a peak needs: along a corridor the walls outvote what
+# tells one place from another.
+_YAW_STEP_DEG, _SHARE = 4.0, 0.5
+# How far the spectra are levelled: at first by half, so that the few things on a field are heard beside a wall or a
+# wood, and not at all when no pose is plain then; and in the second look.
+_LEVELLED, _WHITEN = (0.5, 0.0), (0.0, 0.75)
+# Peaks looked at first; the others are not where one of these is beyond doubt.
+_FIRST = 10
+# Log-odds of the best pose of the run below which no other spectrum finds the right one: of the pairs of `sim:val` and
+# `sim:train` that another spectrum solved, the best pose before had -3.3 at least.
+_LOST = -5.0
+# Degrees: a sensor whose ground leans so much hangs on its head.
+_UPTURNED_DEG = 140.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class BirdsEye(Stage):
+    """Search all yaws and shifts on the ground, for sensors whose tilt the ground tells.
+
+    Both clouds are levelled by their ground (`hybridreg.geometry.ground`) and seen from above in layers of height.
+    Columns with points count for a pose where they meet, columns that one sensor looked through and the other
+    filled count a little against it. The correlation is computed by FFT for every yaw on a coarse grid, its best
+    peaks are improved on a fine one, and the best of these are settled on the surfaces and ranked by the verdict's
+    support. The height follows from the two ground planes. The others come back as `rivals`.
+
+    Where a cloud shows no ground, its sensor is taken to stand upright (or on its head, if the other one does) and
+    its lowest points to be the ground; a note says so.
+
+    Parameters
+    ----------
+    vertical : "ground" or "sensor"
+        What levels the clouds: the ground that each shows, in whatever way its sensor hung; or the z axes of both
+        sensors, for those that stand upright and show a wall or a ceiling, or a ground that is askew.
+    voxel : float or None
+        Resolution, metres; None takes 0.5, less where the clouds reach less than 30 m.
+    layers : tuple of float
+        Borders of the height layers over the ground, in voxels, rising.
+    farthest : float
+        Largest distance between the sensors along the ground, in voxels.
+    tries : int
+        Poses settled and ranked, at most.
+    again : bool
+        Look a second and a third time, with other spectra, where no pose is plain at first.
+    """
+
+    vertical: Literal["ground", "sensor"] = "ground"
+    voxel: float | None = None
+    layers: tuple[float, ...] = (0.6, 2.0, 4.0, 8.0, 20.0)
+    farthest: float = 120.0
+    tries: int = 40
+    again: bool = True
+
+    def __post_init__(self) -> None:
+        if self.vertical not in ("ground", "sensor"):
+            raise ValueError(f"vertical={self.vertical!r} must be 'ground' or 'sensor'")
+        if self.voxel is not None and not 0.0 < self.voxel < np.inf:
+            raise ValueError(f"voxel={self.voxel} must be a positive length in metres")
+        if len(self.layers) < 2 or not (np.diff(self.layers) > 0.0).all():
+            raise ValueError(f"layers={self.layers} must be two or more rising heights in voxels")
+        if not 0.0 < self.farthest < np.inf:
+            raise ValueError(f"farthest={self.farthest} must be a positive number of voxels")
+        if self.tries < 1:
+            raise ValueError(f"tries={self.tries} must be at least 1")
+
+    def __call__(self, scene: Scene, matches: Correspondences, rng: np.random.Generator) -> Pose:
+        voxel = self.voxel or map_cell(scene.pair.source, scene.pair.target)
+        own = ground.on_grid(scene, voxel)
+        frames = _by_ground(own, scene) if self.vertical == "ground" else _by_sensor(own)
+        found = self._laid(scene, own, frames, voxel)
+        if not found:
+            scene.note("bird's-eye search: nothing stands on the ground")
+            return Pose.unknown()
+        return Pose.ranked([one.T for one in distinct(scene, found)])
+
+    def _laid(self, scene: Scene, own: Scene, frames: Sequence[Array], voxel: float) -> list[Rival]:
+        # The best poses where each cloud is levelled by one frame (T_level_source, T_level_target).
+        T_level_source, T_level_target = frames
+        source, target = (self._view(own, s, T, voxel) for s, T in zip(_SIDES, frames, strict=True))
+        if len(source.filled.layer) == 0 or len(target.filled.layer) == 0:
+            return []
+        T_target_level = se3.inverse(T_level_target)
+        found: list[Rival] = []
+        for levelled in _LEVELLED[: None if self.again else 1]:
+            poses = [
+                T_target_level @ M @ T_level_source for M in self._planar(source, target, voxel, levelled)
+            ]
+            for some, plain in ((poses[:_FIRST], BEYOND_DOUBT), (poses[_FIRST:], NEARLY)):
+                found += best_first(scene, some)
+                found.sort(key=lambda rival: -rival.support)
+                if found and found[0].support >= plain:
+                    return found
+            if highest(scene) < _LOST:
+                return found
+        if not found or not self.again:
+            return found
+        # Levelled by the best pose, both clouds lie truer than by their grounds.
+        T_level_source = _centred(T_level_target @ found[0].T, centre(own.source))
+        again = self._slid(self._view(own, "source", T_level_source, voxel), target, voxel)
+        return found + best_first(scene, [T_target_level @ M @ T_level_source for M in again])
+
+    def _view(self, own: Scene, side: Side, T_level_cloud: Array, voxel: float) -> FromAbove:
+        level = getattr(own, side)
+        points = se3.apply(T_level_cloud, level.points)
+        one_place = level.viewpoint is not None and level.viewpoint.ndim == 1
+        eye = se3.apply(T_level_cloud, level.viewpoint[None])[0] if one_place else None
+        near = np.hypot(*points[:, :2].T) < _REACH * voxel
+        return from_above(points[near], eye, tuple(voxel * edge for edge in self.layers), voxel)
+
+    def _planar(self, source: FromAbove, target: FromAbove, voxel: float, whiten: float) -> list[Array]:
+        peaks = sweep(
+            source,
+            target,
+            cell=_COARSE * voxel,
+            yaws=np.arange(0.0, np.pi, np.radians(_YAW_STEP_DEG)),
+            farthest=self.farthest * voxel,
+            most=self.tries,
+            share=_SHARE,
+            whiten=whiten,
+        )
+        found = climb(
+            source, target, peaks, cell=voxel, step_deg=0.4 * _YAW_STEP_DEG, step=0.5 * _COARSE * voxel
+        )
+        return found.matrices
+
+    def _slid(self, source: FromAbove, target: FromAbove, voxel: float) -> list[Array]:
+        """Poses at the yaw that the views have, and half a turn from it: what lies along a street or a corridor decides
+        where, and only a fine map shows it."""
+        if len(source.filled.layer) == 0:
+            return []
+        return [
+            M
+            for whiten in _WHITEN
+            for M in sweep(
+                source,
+                target,
+                cell=voxel,
+                yaws=np.zeros(1),
+                farthest=self.farthest * voxel,
+                most=self.tries,
+                share=0.0,
+                whiten=whiten,
+            ).matrices
+        ]
+
+
+_SIDES: tuple[Side, Side] = ("source", "target")
+
+
+def _centred(T_level_cloud: Array, place: Array) -> Array:
+    # The same turn and heights, with a place (3,) of the cloud on the axis that the maps turn about.
+    R, t = T_level_cloud[:3, :3], T_level_cloud[:3, 3]
+    return se3.from_rt(R, t - (R @ place + t) * [1.0, 1.0, 0.0])
+
+
+def _by_ground(own: Scene, scene: Scene) -> list[Array]:
+    # What levels each cloud by the ground it shows, or by what may be the ground instead.
+    found = {side: ground.find(own, side) for side in _SIDES}
+    frames = []
+    for side, other in zip(_SIDES, reversed(_SIDES), strict=True):
+        shown, known = found[side], found[other]
+        level = getattr(own, side)
+        if shown is None:
+            head_down = known is not None and known.up[2] < np.cos(np.radians(_UPTURNED_DEG))
+            shown = _assumed(level.points, -1.0 if head_down else 1.0)
+            scene.note(
+                f"bird's-eye search: no ground found in the {side}; its sensor is taken to "
+                f"{'hang on its head, as the other does' if head_down else 'stand upright'}"
+            )
+        frames.append(_level_frame(shown, level))
+    return frames
+
+
+def _by_sensor(own: Scene) -> list[Array]:
+    return [_level_frame(_assumed(level.points, 1.0), level) for level in (own.source, own.target)]
+
+
+def _assumed(points: Array, sign: float) -> Ground:
+    up = np.array([0.0, 0.0, sign])
+    return Ground(up, float(np.quantile(points @ up, 0.02)))
+
+
+def _level_frame(g: Ground, level: Level) -> Array:
+    return _centred(se3.from_rt(g.levelling, np.array([0.0, 0.0, -g.height])), centre(level))

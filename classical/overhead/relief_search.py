@@ -1,0 +1,64 @@
+# SPDX-License-Identifier: MIT
+"""Pose from the relief of the ground: where do the hollows of one field lie on those of another?"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hybridreg.classical.overhead.relief_climb import climb, laid
+from hybridreg.classical.overhead.relief_sweep import COARSE, search
+from hybridreg.config import limits
+from hybridreg.evidence import views
+from hybridreg.geometry import se3
+from hybridreg.matches import Correspondences, Pose
+from hybridreg.scene import Scene
+from hybridreg.search.rivals import best_first, distinct, resting
+from hybridreg.stage import Stage
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True)
+class ReliefSearch(Stage):
+    """Search all yaws and shifts for the one that lays hollows on hollows and heights on heights.
+
+    Each cloud's ground (`hybridreg.geometry.ground_relief`) is a map with gaps; maps are laid on one another by
+    correlation at every yaw and shift (`hybridreg.classical.overhead.relief_sweep`), the best as they lie and settled
+    on the surfaces, and ranked by the verdict's support. For open ground, where little else holds a pose; without
+    ground in both clouds, no pose.
+
+    Parameters
+    ----------
+    farthest : float
+        Largest distance between the sensors along the ground, metres.
+    tries : int
+        Poses settled and ranked, at most.
+    """
+
+    farthest: float = 60.0
+    tries: int = 8
+
+    def __post_init__(self) -> None:
+        limits.positive(self, "farthest")
+        limits.at_least(self, 1, "tries")
+
+    def __call__(self, scene: Scene, matches: Correspondences, rng: np.random.Generator) -> Pose:
+        source, target = (view.relief for view in views.views(scene))
+        if source is None or target is None:
+            scene.note("relief search: no ground found in both clouds")
+            return Pose.unknown()
+        planar = search(source, target, self.farthest, self.tries)
+        if not planar:
+            scene.note("relief search: too little ground that both clouds show")
+            return Pose.unknown()
+        T_target_level = se3.inverse(target.T_level_cloud)
+        poses = [
+            T_target_level @ laid(source, target, M) @ source.T_level_cloud
+            for M in climb(source, target, planar, COARSE * target.cell)
+        ]
+        # What pulls on a field are the few things that stand on it, which may draw a pose off its ground.
+        found = [*best_first(scene, poses), *resting(scene, poses)]
+        return Pose.ranked([one.T for one in distinct(scene, found)])

@@ -1,0 +1,2 @@
+# SPDX-License-Identifier: MIT
+"""Tables, figures and pages of results."""

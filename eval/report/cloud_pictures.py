@@ -1,0 +1,76 @@
+# SPDX-License-Identifier: MIT
+"""Pictures of clouds from above, by matplotlib, without a display."""
+
+from __future__ import annotations
+
+import os
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hybridreg.geometry import se3
+from hybridreg.io import atomic_path
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+Array = NDArray[np.float64]
+
+_SOURCE, _TARGET = "#d95f02", "#3b6fb6"
+_DRAWN = 30_000
+
+
+def before_after(path: str | os.PathLike[str], source: Array, target: Array, T: Array) -> None:
+    """Write a PNG: both clouds from above in the target's frame, as they came and aligned.
+
+    Parameters
+    ----------
+    source, target : (N, 3), (M, 3), metres
+    T : (4, 4), source to target
+    """
+    moving, still = thin(source), thin(target)
+    views = {"before": moving, "after": se3.apply(T, moving)}
+    frame = window(np.vstack(list(views.values())))
+    figure = new_figure((10, 5.2))
+    for axes, (title, points) in zip(figure.subplots(1, 2), views.items(), strict=True):
+        _draw(axes, points, still, frame)
+        axes.set_title(f"{title}, from above")
+    save(figure, path)
+
+
+def new_figure(inches: tuple[float, float]) -> Figure:
+    """An empty figure that needs no display."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=inches, dpi=110, layout="constrained")
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def save(figure: Figure, path: str | os.PathLike[str]) -> None:
+    """Write a figure as PNG, whole or not at all."""
+    with atomic_path(path) as temporary:
+        figure.savefig(temporary, format="png")
+
+
+def window(points: Array) -> tuple[Array, Array]:
+    """Corners (2,), (2,) of a square around points (N, 3), without their few far returns."""
+    # Those would shrink the scene to a dot.
+    low, high = np.quantile(points[:, :2], [0.02, 0.98], axis=0)
+    middle, half = (low + high) / 2, 0.65 * float(max(high - low))
+    return middle - half, middle + half
+
+
+def _draw(axes: Any, source: Array, target: Array, window: tuple[Array, Array]) -> None:
+    axes.scatter(target[:, 0], target[:, 1], s=0.8, c=_TARGET, linewidths=0, label="target")
+    axes.scatter(source[:, 0], source[:, 1], s=0.8, c=_SOURCE, linewidths=0, label="source")
+    low, high = window
+    axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), xlabel="x, m", aspect="equal")
+    axes.legend(markerscale=8, loc="upper right")
+
+
+def thin(points: Array) -> Array:
+    """The points (N, 3), or some of them where a picture has no room for more."""
+    return points[:: max(1, len(points) // _DRAWN)]

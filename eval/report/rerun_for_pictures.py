@@ -1,0 +1,88 @@
+# SPDX-License-Identifier: MIT
+"""Pictures of a table's pairs: its pipelines are run once more on a few of them, with the same seed."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hybridreg.config.plain_values import value_of
+from hybridreg.data.dataset import ids_of
+from hybridreg.eval.report import stage_pictures
+from hybridreg.eval.run.controls import Control
+from hybridreg.eval.score.protocols import Protocol
+from hybridreg.eval.table_file import slug
+from hybridreg.eval.table_run import Entry, Table
+from hybridreg.frames import lower_pose
+from hybridreg.pair import LabelledPair
+from hybridreg.pipeline import Pipeline, Trace
+from hybridreg.slots import SLOTS
+
+
+def redraw(
+    table: Table,
+    protocol: Protocol,
+    pairs: Sequence[LabelledPair],
+    out: str | os.PathLike[str],
+    n: int,
+) -> list[Path]:
+    """Write pictures of the first ``n`` pairs under every pipeline of a table.
+
+    Returns
+    -------
+    Files ``out/<line>/<pair>-matches.png`` of pipelines that make matches, and ``-mask.png`` of those whose overlap
+    stage leaves something out.
+
+    Raises
+    ------
+    MissingWeights, ValueError
+        A pipeline cannot be built again.
+    """
+    written = []
+    ids = ids_of(pairs)
+    for entry in table.methods:
+        control = _control(entry)
+        if control is None:
+            continue
+        folder = Path(out) / slug(entry.name)
+        for name in [row.id for row in entry.rows if row.error is None and row.id in ids][:n]:
+            written += _draw(control, pairs[ids.index(name)], table.seed, protocol, folder)
+    return written
+
+
+def _control(entry: Entry) -> Control | None:
+    # A plain function left no word of how to make it again.
+    spec: Mapping[str, Any] = entry.config.get("method", {})
+    if not set(SLOTS) <= set(spec):
+        return None
+    pipeline = Pipeline(**{slot: spec[slot] for slot in SLOTS})
+    told = value_of(Mapping[str, bool], spec.get("control", {}), f"{entry.name}: control")
+    unknown = set(told) - {"oracle", "image"}
+    if unknown:
+        raise ValueError(f"{entry.name}: no control is called {', '.join(sorted(unknown))}")
+    return Control(pipeline=pipeline, **told)
+
+
+def _draw(
+    control: Control, labelled: LabelledPair, seed: int, protocol: Protocol, folder: Path
+) -> list[Path]:
+    pipeline, pair = control.told(labelled)
+    trace = pipeline.trace(pair, seed=seed)
+    truth = lower_pose(labelled.T_target_source, pair)
+    folder.mkdir(parents=True, exist_ok=True)
+    written = []
+    if len(trace.matches):
+        written.append(folder / f"{slug(pair.id)}-matches.png")
+        stage_pictures.matches(written[-1], trace, truth, protocol.inlier_m)
+    if not _keeps_all(trace):
+        written.append(folder / f"{slug(pair.id)}-mask.png")
+        stage_pictures.mask(written[-1], trace, truth)
+    return written
+
+
+def _keeps_all(trace: Trace) -> bool:
+    return bool(np.all(trace.overlap.source == 1.0) and np.all(trace.overlap.target == 1.0))

@@ -1,0 +1,114 @@
+# SPDX-License-Identifier: MIT
+"""Pictures of what the stages of one run made: matches by correctness, and the overlap mask beside the photograph."""
+
+from __future__ import annotations
+
+import os
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hybridreg.eval.report.cloud_pictures import new_figure, save, thin, window
+from hybridreg.eval.run.controls import true_overlap
+from hybridreg.eval.score import metrics
+from hybridreg.geometry import se3
+from hybridreg.pipeline import Trace
+
+Array = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+
+RIGHT, WRONG, POINTS = "#1b9e77", "#d7301f", "#b8b8b8"
+# Kept and rightly so, kept wrongly, dropped wrongly, dropped and rightly so.
+_KINDS = (
+    ("kept, overlaps", RIGHT),
+    ("kept, does not overlap", WRONG),
+    ("dropped, overlaps", "#e6ab02"),
+    ("dropped, does not overlap", POINTS),
+)
+_LINES = 600
+_MANY = 5000
+
+
+def matches(path: str | os.PathLike[str], trace: Trace, T_true: Array, inlier_m: float = 1.0) -> None:
+    """Write a PNG of both clouds from above, side by side and turned alike, with a line for every match.
+
+    The source is drawn under its true pose and moved to the right, so that right matches are parallel.
+
+    Parameters
+    ----------
+    trace : of `Pipeline.trace`
+    T_true : (4, 4), source to target, between the clouds with their offsets taken off
+    inlier_m : a match is right when it is off by less, metres
+    """
+    target, source = trace.scene.target.points, se3.apply(T_true, trace.scene.source.points)
+    low, high = window(np.vstack([target, source]))
+    aside = np.array([1.15 * (high[0] - low[0]), 0.0, 0.0])
+    found = trace.matches
+    off = metrics.match_residuals(found.source, found.target, T_true)
+    right = off < inlier_m
+    figure = new_figure((12, 6))
+    axes = figure.subplots()
+    for points, label in ((target, "target"), (source + aside, "source, under its true pose")):
+        _scatter(axes, points, POINTS)
+        middle = (low[0] + high[0]) / 2 + (0.0 if label == "target" else aside[0])
+        axes.text(middle, high[1], label, ha="center", va="bottom")
+    moved = se3.apply(T_true, found.source) + aside
+    for which, colour, label in ((~right, WRONG, "wrong"), (right, RIGHT, "right")):
+        _lines(axes, found.target[which], moved[which], colour, f"{which.sum()} {label}")
+    axes.set(xlim=(low[0], high[0] + aside[0]), ylim=(low[1], high[1]), aspect="equal", xlabel="x, m")
+    axes.legend(loc="lower right")
+    axes.set_title(f"{len(found)} matches, right within {inlier_m:g} m", pad=18)
+    save(figure, path)
+
+
+def mask(path: str | os.PathLike[str], trace: Trace, T_true: Array) -> None:
+    """Write a PNG of both clouds from above, coloured by what the overlap mask says of them and what is true.
+
+    A point overlaps when the other cloud, under the true pose, has a point within twice the levels' spacing; it is
+    kept when its probability is above one half. The photograph stands beside them where there is one.
+    """
+    scene, overlap = trace.scene, trace.overlap
+    in_source, in_target = true_overlap(scene, T_true)
+    sides = (
+        ("source", scene.source.points, overlap.source > 0.5, in_source),
+        ("target", scene.target.points, overlap.target > 0.5, in_target),
+    )
+    figure = new_figure((16, 5.2))
+    panels = figure.subplots(1, 3)
+    for axes, (name, points, kept, true) in zip(panels, sides, strict=False):
+        _kinds(axes, points, kept, true)
+        scores = metrics.mask_scores(kept, true)
+        axes.set_title(f"{name}: precision {scores.precision:.2f}, recall {scores.recall:.2f}")
+    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower left", ncols=4, markerscale=6)
+    _photograph(panels[2], scene.pair.image)
+    save(figure, path)
+
+
+def _kinds(axes: Any, points: Array, kept: Bools, true: Bools) -> None:
+    low, high = window(points)
+    members = (kept & true, kept & ~true, ~kept & true, ~kept & ~true)
+    for member, (label, colour) in reversed(list(zip(members, _KINDS, strict=True))):
+        _scatter(axes, points[member], colour, label)
+    axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal", xlabel="x, m")
+
+
+def _photograph(axes: Any, image: NDArray[np.uint8] | None) -> None:
+    axes.set_axis_off()
+    axes.set_title("no photograph" if image is None else "photograph")
+    if image is not None:
+        axes.imshow(image)
+
+
+def _scatter(axes: Any, points: Array, colour: str, label: str | None = None) -> None:
+    drawn = thin(points)
+    size = 1.0 if len(drawn) > _MANY else 4.0
+    axes.scatter(drawn[:, 0], drawn[:, 1], s=size, c=colour, linewidths=0, label=label)
+
+
+def _lines(axes: Any, ends: Array, others: Array, colour: str, label: str) -> None:
+    from matplotlib.collections import LineCollection
+
+    step = max(1, len(ends) // _LINES)
+    segments = np.stack([ends[::step, :2], others[::step, :2]], axis=1)
+    axes.add_collection(LineCollection(list(segments), colors=colour, linewidths=0.6, alpha=0.6, label=label))

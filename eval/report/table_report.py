@@ -1,0 +1,161 @@
+# SPDX-License-Identifier: MIT
+"""Reports of a table: Markdown, LaTeX, CSV, and one HTML page."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from hybridreg.data.dataset import ids_of
+from hybridreg.eval.report import formats, page, plotly_figures
+from hybridreg.eval.report.table_columns import Cells, number
+from hybridreg.eval.run.attempt import one_line
+from hybridreg.eval.run.row import Row
+from hybridreg.eval.score import errors
+from hybridreg.eval.score.protocols import Protocol
+from hybridreg.eval.score.scoring import identity
+from hybridreg.eval.table_run import Entry, Table
+from hybridreg.io import write_text
+from hybridreg.pair import LabelledPair
+
+# A browser keeps about sixteen 3D views alive; half of that leaves room for another page.
+_MOST_VIEWS = 8
+
+
+def write(
+    table: Table,
+    protocols: Sequence[Protocol],
+    out: str | os.PathLike[str],
+    pairs: Sequence[LabelledPair] | None = None,
+) -> list[Path]:
+    """Write `table.md`, `table.tex`, `table.csv` and `report.html`, each whole or not at all, always as UTF-8.
+
+    Parameters
+    ----------
+    pairs : the data that the rows are of, for the 3D views; None leaves the views out
+
+    Returns
+    -------
+    The files written.
+
+    Raises
+    ------
+    OSError
+        Files that could not be written: the first is named with its reason, and those that were written are there.
+    """
+    folder = Path(out)
+    folder.mkdir(parents=True, exist_ok=True)
+    # The page is the largest, and the one that reads the data again.
+    contents: dict[str, Callable[[], str]] = {
+        "table.md": lambda: formats.markdown(table, protocols),
+        "table.tex": lambda: formats.latex(table, protocols),
+        "table.csv": lambda: formats.table_csv(table, protocols),
+        "report.html": lambda: html(table, protocols, pairs),
+    }
+    failed: list[OSError] = []
+    for name, make in contents.items():
+        text = make()
+        try:
+            write_text(folder / name, text)
+        except OSError as error:
+            failed.append(error)
+    if failed:
+        raise failed[0]
+    return [folder / name for name in contents]
+
+
+def html(table: Table, protocols: Sequence[Protocol], pairs: Sequence[LabelledPair] | None = None) -> str:
+    """The page: tables and curves of every protocol; pairs and views by the first of them."""
+    body = [page.heading(table.title, 1), page.paragraph(formats.fine_print(table))]
+    for protocol in protocols:
+        body += _protocol_part(table, protocol)
+    if table.paper is not None:
+        body += [page.heading(table.paper.heading()), page.html_table(table.paper.cells())]
+    body += [page.heading("Every pair"), page.paragraph(f"By protocol {protocols[0].name}.")]
+    lines = [line for entry in table.methods for line in _pair_lines(entry, protocols[0])]
+    if lines:
+        body.append(page.filterable(lines, success="success", text_from="verdict"))
+    body += [page.heading("The worst pairs"), *_views(table, protocols[0], pairs)]
+    body.append(page.heading("Settings"))
+    for entry in table.methods:
+        body += [page.heading(entry.name, 3), page.code(entry.config)]
+    body += [page.paragraph(remark) for remark in table.remarks()]
+    return page.page(table.title, body)
+
+
+def _protocol_part(table: Table, protocol: Protocol) -> Iterator[str]:
+    rows = {entry.name: entry.rows for entry in table.entries if entry.rows}
+    yield page.heading(f"Protocol {protocol.name}")
+    yield page.paragraph(f"{table.caption(protocol)} ({protocol.source}).")
+    for title, lines in formats.tables(table, protocol).items():
+        if lines:
+            yield page.heading(title, 3)
+            yield page.html_table(lines)
+    plots = plotly_figures.recall_curves(rows, protocol)
+    judged = {name: each for name, each in rows.items() if any(row.confidence is not None for row in each)}
+    if judged:
+        plots += [plotly_figures.reliability(judged, protocol), plotly_figures.confidence(judged, protocol)]
+    yield f'<div class="curves">{"".join(f"<div>{plotly_figures.to_html(plot)}</div>" for plot in plots)}</div>'
+
+
+def _pair_lines(entry: Entry, protocol: Protocol) -> Iterator[Cells]:
+    measured = errors.of(entry.rows)
+    for i, (row, success) in enumerate(zip(entry.rows, measured.success(protocol), strict=True)):
+        yield {
+            "method": entry.name,
+            "pair": row.id,
+            "success": "yes" if success else "no",
+            "RRE°": number(float(measured.rre_deg[i]), 3),
+            "RTE m": number(float(measured.rte_m[i]), 3),
+            "overlap": number(np.nan if row.overlap is None else row.overlap, 2),
+            "confidence": number(np.nan if row.confidence is None else row.confidence, 3),
+            "seconds": number(row.seconds.get("total", np.nan), 2),
+            "verdict": row.verdict or ("no pose" if row.T is None else "–"),
+            "why": row.error or "; ".join(row.reasons),
+        }
+
+
+def _views(table: Table, protocol: Protocol, pairs: Sequence[LabelledPair] | None) -> Iterator[str]:
+    if pairs is None:
+        yield page.paragraph("The data was not at hand when this page was written, so there are no views.")
+        return
+    ids = ids_of(pairs)
+    for name, row in worst(table, protocol):
+        if row.id not in ids or row.T_true is None:
+            continue
+        found = np.eye(4) if row.T is None else np.array(row.T)
+        yield page.heading(f"{row.id}, {name}", 3)
+        yield page.paragraph(_told(row))
+        try:
+            pair = pairs[ids.index(row.id)].pair
+        except (OSError, ValueError) as error:  # data that went bad since must not cost the report
+            yield page.paragraph(f"There is no view: {one_line(error)}")
+            continue
+        yield plotly_figures.to_html(
+            plotly_figures.clouds(pair.source.points, pair.target.points, found, np.array(row.T_true))
+        )
+
+
+def worst(table: Table, protocol: Protocol) -> list[tuple[str, Row]]:
+    """Each method's pairs with the largest errors, the methods taking turns."""
+    ranked = []
+    for entry in table.methods:
+        measured = [row for row in entry.rows if row.T_true is not None]
+        # Where there is no pose the error of the identity decides which is worse.
+        posed = [row if row.T is not None else identity([row])[0] for row in measured]
+        order = np.argsort(-plotly_figures.badness(posed, protocol), kind="stable")
+        ranked.append([(entry.name, measured[i]) for i in order])
+    turns = [each[k] for k in range(_MOST_VIEWS) for each in ranked if k < len(each)]
+    return turns[:_MOST_VIEWS]
+
+
+def _told(row: Row) -> str:
+    measured = errors.of([row])
+    verdict = f'verdict "{row.verdict}"' if row.verdict else "no verdict"
+    found = "no pose, shown as it came" if row.T is None else verdict
+    return (
+        f"RRE {measured.rre_deg[0]:.2f}°, RTE {measured.rte_m[0]:.2f} m, {found}. {row.error or ''}".strip()
+    )

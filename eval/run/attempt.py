@@ -1,0 +1,93 @@
+# SPDX-License-Identifier: MIT
+"""One method on one pair. No truth comes in here."""
+
+from __future__ import annotations
+
+import dataclasses
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Protocol, runtime_checkable
+
+from hybridreg.frames import raise_pose
+from hybridreg.matches import Correspondences
+from hybridreg.pair import Pair
+from hybridreg.pipeline import Trace
+from hybridreg.result import RegistrationResult
+from hybridreg.runtime.resources import peak_memory_mb, reset_peak_memory
+
+
+@runtime_checkable
+class Traceable(Protocol):
+    """A method that shows what its stages made: `hybridreg.Pipeline`, or anything that does as it does."""
+
+    def trace(self, pair: Pair, *, seed: int = 0) -> Trace: ...
+
+    def conclude(self, trace: Trace, *, seed: int = 0) -> RegistrationResult: ...
+
+
+# Or a function of pair and seed that returns a 4x4 pose, a RegistrationResult, or None for "not found".
+Method = Traceable | Callable[[Pair, int], Any]
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Attempt:
+    """What a method made of a pair."""
+
+    T: Any
+    seconds: dict[str, float]
+    peak_memory_mb: float | None = None
+    error: str | None = None
+    T_estimated: Any = None
+    matches: Correspondences | None = None
+    result: RegistrationResult | None = None
+    trace: Trace | None = None
+
+
+def attempt(method: Method, pair: Pair, seed: int) -> Attempt:
+    """Run a method; whatever it raises becomes `error`, in one line.
+
+    Raises
+    ------
+    ImportError
+        A package that the method needs is not here: it was not run.
+    """
+    reset_peak_memory()
+    start = time.perf_counter()
+    try:
+        tried = _traced(method, pair, seed) if isinstance(method, Traceable) else _called(method, pair, seed)
+    except ImportError:  # what was never run has not failed
+        raise
+    except Exception as error:  # a failing pair is a failed row, never an abort
+        seconds = {"total": time.perf_counter() - start}
+        return Attempt(T=None, seconds=seconds, peak_memory_mb=peak_memory_mb(), error=one_line(error))
+    tried.seconds["total"] = time.perf_counter() - start
+    return dataclasses.replace(tried, peak_memory_mb=peak_memory_mb())
+
+
+def _traced(method: Traceable, pair: Pair, seed: int) -> Attempt:
+    trace = method.trace(pair, seed=seed)
+    result = method.conclude(trace, seed=seed)
+    return Attempt(
+        # A pose that was not found is the identity, which near-by pairs would count as right.
+        T=result.transformation if trace.refined.found else None,
+        T_estimated=raise_pose(trace.estimated.T, pair) if trace.estimated.found else None,
+        seconds=dict(result.seconds),
+        matches=result.matches,
+        result=result,
+        trace=trace,
+    )
+
+
+def _called(method: Callable[[Pair, int], Any], pair: Pair, seed: int) -> Attempt:
+    answer = method(pair, seed)
+    if isinstance(answer, RegistrationResult):
+        return Attempt(
+            T=answer.transformation, seconds=dict(answer.seconds), matches=answer.matches, result=answer
+        )
+    return Attempt(T=answer, seconds={})
+
+
+def one_line(error: BaseException) -> str:
+    """An exception as one line of text."""
+    return " ".join(f"{type(error).__name__}: {error}".split())

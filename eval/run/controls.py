@@ -1,0 +1,85 @@
+# SPDX-License-Identifier: MIT
+"""Controls of an ablation: a pipeline that is told what no method may know, or kept from what it may see.
+
+The truth stays within the evaluator: `predict` hands the labelled pair to the control, which gives back a pipeline for
+this one pair. The stage that answers from the truth is not registered, so no pipeline file can name it.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from hybridreg.frames import lower_pose
+from hybridreg.geometry import se3
+from hybridreg.matches import Overlap
+from hybridreg.pair import LabelledPair, Pair
+from hybridreg.pipeline import Pipeline
+from hybridreg.scene import Scene
+
+Array = NDArray[np.float64]
+
+# Behind the name of a line that is no method.
+MARK = " †"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Control:
+    """A pipeline that is run as a control.
+
+    Attributes
+    ----------
+    oracle : replace its overlap stage by the true overlap
+    image : let it see the photograph
+    """
+
+    pipeline: Pipeline
+    oracle: bool = False
+    image: bool = True
+
+    def to_spec(self) -> dict[str, Any]:
+        """The pipeline's tables, and what the control does to it."""
+        return {**self.pipeline.to_spec(), "control": {"oracle": self.oracle, "image": self.image}}
+
+    def told(self, labelled: LabelledPair) -> tuple[Pipeline, Pair]:
+        """The pipeline for this pair, and the pair as it may be seen."""
+        pipeline, pair = self.pipeline, labelled.pair
+        if self.oracle:
+            pipeline = pipeline.swap(overlap=TrueOverlap(T=lower_pose(labelled.T_target_source, pair)))
+        return pipeline, pair if self.image else dataclasses.replace(pair, image=None)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class TrueOverlap:
+    """The overlap as the truth has it: points with a point of the other level nearby.
+
+    Attributes
+    ----------
+    T : (4, 4) true pose, source to target
+    """
+
+    T: Array
+
+    def __call__(self, scene: Scene) -> Overlap:
+        scene.note("control: the overlap was taken from the truth, this is no method")
+        source, target = true_overlap(scene, self.T)
+        return Overlap(source.astype(float), target.astype(float))
+
+
+def true_overlap(scene: Scene, T: Array) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Which points (n,) of the source's level and (m,) of the target's have one of the other within twice the
+    spacing under the true pose T."""
+    moved, target, radius = se3.apply(T, scene.source.points), scene.target.points, 2.0 * scene.spacing
+    return near(moved, target, radius), near(target, moved, radius)
+
+
+def near(points: Array, others: Array, radius: float) -> NDArray[np.bool_]:
+    """Which points (n, 3) have one of the others within the radius, (n,)."""
+    distance, _ = cKDTree(others).query(points, distance_upper_bound=radius)
+    found: NDArray[np.bool_] = np.isfinite(distance)
+    return found

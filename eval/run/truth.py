@@ -1,0 +1,118 @@
+# SPDX-License-Identifier: MIT
+"""The truth joined to what a method made, after it has returned."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from hybridreg.eval.run.attempt import Attempt
+from hybridreg.eval.run.controls import near, true_overlap
+from hybridreg.eval.run.row import Matrix, Row, matrix
+from hybridreg.eval.score import metrics
+from hybridreg.eval.score.protocols import INLIER_RADII
+from hybridreg.frames import lower_pose
+from hybridreg.geometry import se3
+from hybridreg.matches import Correspondences
+from hybridreg.pair import LabelledPair, Pair
+from hybridreg.pipeline import Trace
+from hybridreg.resolution import default_voxel
+
+# More source points than this change the overlap's measure in the third digit only.
+_SAMPLE = 10_000
+
+
+def row(index: int, labelled: LabelledPair, tried: Attempt) -> Row:
+    """The row of a pair: the attempt, and the truth measured against it."""
+    pair = labelled.pair
+    return Row(
+        index=index,
+        id=pair.id,
+        T=_lowered(tried.T, pair),
+        T_estimated=_lowered(tried.T_estimated, pair),
+        error=tried.error,
+        seconds=tried.seconds,
+        peak_memory_mb=tried.peak_memory_mb,
+        n_points={"source": len(pair.source), "target": len(pair.target), **_level_sizes(tried.trace)},
+        T_true=_lowered(labelled.T_target_source, pair),
+        offsets=_offsets(pair),
+        **_judged(tried),
+        **_overlap(labelled),
+        **_matched(tried.matches, labelled.T_target_source),
+        mask=None if tried.trace is None else _mask(tried.trace, labelled),
+    )
+
+
+def _lowered(T: Any, pair: Pair) -> Matrix | None:
+    # Half a degree about the origin of a map grid moves a cloud by kilometres: errors are only comparable
+    # in the small coordinates.
+    return None if matrix(T) is None else matrix(lower_pose(np.asarray(T, dtype=np.float64), pair))
+
+
+def _offsets(pair: Pair) -> dict[str, list[float]] | None:
+    if not (pair.source.offset.any() or pair.target.offset.any()):
+        return None
+    return {"source": pair.source.offset.tolist(), "target": pair.target.offset.tolist()}
+
+
+def _judged(tried: Attempt) -> dict[str, Any]:
+    result = tried.result
+    if result is None:
+        return {}
+    own = {
+        "fitness": result.fitness,
+        "fitness_target": result.fitness_target,
+        "inlier_rmse": result.inlier_rmse,
+    }
+    return {
+        "verdict": result.verdict,
+        "confidence": _finite(result.confidence),
+        "reasons": list(result.reasons),
+        "evidence": {key: _finite(value) for key, value in {**own, **result.evidence}.items()},
+        "notes": list(result.notes),
+    }
+
+
+def _finite(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None
+
+
+def _level_sizes(trace: Trace | None) -> dict[str, int]:
+    if trace is None:
+        return {}
+    return {"source_level": len(trace.scene.source), "target_level": len(trace.scene.target)}
+
+
+def _overlap(labelled: LabelledPair) -> dict[str, Any]:
+    # The radius comes from the clouds alone, so that every method is measured on the same points.
+    pair = labelled.pair
+    radius = default_voxel(pair.source, pair.target)
+    sample = pair.source.points[:: max(1, len(pair.source) // _SAMPLE)]
+    moved = se3.apply(lower_pose(labelled.T_target_source, pair), sample)
+    common = sample[near(moved, pair.target.points, radius)]
+    return {
+        "overlap": len(common) / len(sample),
+        "overlap_radius": radius,
+        "moments": matrix(metrics.second_moments(common)),
+    }
+
+
+def _matched(matches: Correspondences | None, truth: metrics.Array) -> dict[str, Any]:
+    if matches is None:
+        return {}
+    residuals = metrics.match_residuals(matches.source, matches.target, truth)
+    ratio = {
+        f"{radius:g}": float(np.mean(residuals < radius)) if len(residuals) else 0.0
+        for radius in INLIER_RADII
+    }
+    return {"n_matches": len(matches), "inlier_ratio": ratio}
+
+
+def _mask(trace: Trace, labelled: LabelledPair) -> dict[str, float] | None:
+    # A mask that keeps every point is no prediction.
+    predicted = np.concatenate([trace.overlap.source, trace.overlap.target])
+    if np.all(predicted == 1.0):
+        return None
+    truth = true_overlap(trace.scene, lower_pose(labelled.T_target_source, labelled.pair))
+    return metrics.mask_scores(predicted > 0.5, np.concatenate(truth))._asdict()

@@ -1,0 +1,2 @@
+# SPDX-License-Identifier: MIT
+"""From kept rows to scores."""

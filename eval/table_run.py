@@ -1,0 +1,287 @@
+# SPDX-License-Identifier: MIT
+"""A table: several methods on the same pairs, run once and kept in a folder."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from hybridreg.config.plain_values import build
+from hybridreg.data.yaw_starts import YawStarts
+from hybridreg.eval.run import store
+from hybridreg.eval.run.prediction import predict
+from hybridreg.eval.run.row import Row
+from hybridreg.eval.score import paper, scoring
+from hybridreg.eval.score.paper import Printed
+from hybridreg.eval.score.protocols import Protocol
+from hybridreg.eval.table_file import Recipe, slug
+from hybridreg.io import write_json
+from hybridreg.io.lock import folder_lock
+from hybridreg.io.structured import read_json
+from hybridreg.pair import LabelledPair
+from hybridreg.runtime import optional_packages
+
+IDENTITY = "identity"
+_INDEX = "table.json"
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Entry:
+    """One method's rows; `config` is what made them."""
+
+    name: str
+    rows: list[Row]
+    config: dict[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Table:
+    """Methods side by side.
+
+    Attributes
+    ----------
+    entries : the identity first, then the methods
+    starts : turned copies of each pair
+    problems : lines that could not be built or run, with the reason
+    left_out : what some lines did without, for want of a package
+    paper : figures that somebody printed, to be shown apart
+    """
+
+    title: str
+    data: str
+    seed: int
+    starts: int
+    entries: list[Entry]
+    problems: dict[str, str] = field(default_factory=dict)
+    left_out: dict[str, str] = field(default_factory=dict)
+    paper: Printed | None = None
+
+    def remarks(self) -> list[str]:
+        """Sentences on what was not run."""
+        without = (f"{name} ran without {text}" for name, text in self.left_out.items())
+        return [*(f"Not run: {name}. {problem}" for name, problem in self.problems.items()), *without]
+
+    @property
+    def methods(self) -> list[Entry]:
+        """The entries but the identity."""
+        return [entry for entry in self.entries if entry.name != IDENTITY]
+
+    def scores(self, protocol: Protocol) -> dict[str, scoring.Score]:
+        """Score of every entry that has rows."""
+        return {entry.name: scoring.score(entry.rows, protocol) for entry in self.entries if entry.rows}
+
+    def caption(self, protocol: Protocol) -> str:
+        """Which number is this: the data, the starts, the protocol."""
+        n = max((len(entry.rows) for entry in self.entries), default=0)
+        runs = f"{n} pairs"
+        if self.starts:
+            runs = f"{n // (self.starts + 1)} pairs, each as it is and under {self.starts} random yaw starts, {n} runs"
+        return f"{self.title}. Data {self.data or 'unnamed'}, {runs}; {protocol.describe()}"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Index:
+    """What is noted of a table beside its predictions; `lines` are the names of those that were run."""
+
+    title: str
+    data: str
+    seed: int
+    starts: int
+    protocols: tuple[str, ...]
+    lines: tuple[str, ...]
+    problems: Mapping[str, str]
+    left_out: Mapping[str, str] = field(default_factory=dict)
+    paper: Mapping[str, Any] | None = None
+
+    def __post_init__(self) -> None:
+        if self.starts < 0:
+            raise ValueError(f"{_INDEX}: starts {self.starts} must be 0 or more")
+
+
+@dataclass(frozen=True, kw_only=True)
+class _MadeFrom:
+    """The data that stored rows are of."""
+
+    name: str
+    pairs: int
+    fingerprint: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Made:
+    """What must agree between files of predictions that stand in one table."""
+
+    data: _MadeFrom
+    seed: int
+
+
+def run(
+    recipe: Recipe,
+    pairs: Sequence[LabelledPair],
+    out: str | os.PathLike[str],
+    *,
+    data: str = "",
+    workers: int | None = None,
+    overwrite: bool = False,
+    on_row: Callable[[str, Row], None] | None = None,
+) -> Table:
+    """Run every line of a recipe; what `out` already holds is not run again.
+
+    Parameters
+    ----------
+    pairs : the data without the yaw starts that the recipe asks for
+    out : folder; the rows go to `out/predictions/<line>.jsonl`
+    on_row : called with each line's name and row
+
+    Raises
+    ------
+    InUse
+        Another process is writing into `out`.
+    ValueError
+        No line can be run, or `out` holds predictions of another configuration.
+    OSError
+        `out` cannot be written to, or the disk is full; rows that are done are kept.
+    """
+    if all(line.method is None for line in recipe.lines):
+        raise ValueError(
+            f"none of {len(recipe.lines)} lines can be run; the first: {recipe.lines[0].problem}"
+        )
+    folder = Path(out)
+    (folder / "predictions").mkdir(parents=True, exist_ok=True)
+    with folder_lock(folder):
+        return _run(recipe, pairs, folder, data, workers, overwrite, on_row)
+
+
+def _run(
+    recipe: Recipe,
+    pairs: Sequence[LabelledPair],
+    folder: Path,
+    data: str,
+    workers: int | None,
+    overwrite: bool,
+    on_row: Callable[[str, Row], None] | None,
+) -> Table:
+    tried = YawStarts(pairs, recipe.starts, recipe.seed) if recipe.starts else pairs
+    problems = {line.name: line.problem for line in recipe.lines if line.method is None}
+    lines: list[str] = []
+    for name, method in ((line.name, line.method) for line in recipe.lines if line.method is not None):
+        heard = None if on_row is None else lambda row, name=name: on_row(name, row)
+        try:
+            predict(
+                method,
+                tried,
+                _file(folder, name),
+                seed=recipe.seed,
+                workers=workers,
+                overwrite=overwrite,
+                data=data,
+                on_row=heard,
+            )
+        except ImportError as error:
+            problems[name] = " ".join(str(error).split())
+        else:
+            lines.append(name)
+    if not lines:
+        name, problem = next(iter(problems.items()))
+        raise ValueError(f"none of {len(problems)} lines can be run here; the first, {name}: {problem}")
+    methods = {line.name: line.method for line in recipe.lines}
+    index: dict[str, Any] = {
+        "title": recipe.title,
+        "data": data,
+        "seed": recipe.seed,
+        "starts": recipe.starts,
+        "protocols": [protocol.name for protocol in recipe.protocols],
+        "lines": lines,
+        "problems": problems,
+        "left_out": {name: text for name in lines if (text := optional_packages.left_out(methods[name]))},
+        "paper": None if recipe.paper is None else recipe.paper.to_dict(),
+    }
+    write_json(folder / _INDEX, index)
+    return load(folder)
+
+
+def load(folder: str | os.PathLike[str]) -> Table:
+    """The table that `run` left in a folder.
+
+    Raises
+    ------
+    FileNotFoundError
+        No table was run there.
+    ValueError
+        A file there is damaged, or holds no row yet.
+    """
+    index = read_index(folder)
+    entries = [_entry(name, _file(Path(folder), name)) for name in index.lines]
+    return Table(
+        title=index.title,
+        data=index.data,
+        seed=index.seed,
+        starts=index.starts,
+        problems=dict(index.problems),
+        left_out=dict(index.left_out),
+        paper=None if index.paper is None else paper.parse(index.paper),
+        entries=_with_identity(entries),
+    )
+
+
+def of_files(paths: Sequence[str | os.PathLike[str]]) -> Table:
+    """A table of single files of predictions, named after the files.
+
+    Raises
+    ------
+    ValueError
+        The files are not of the same data.
+    """
+    entries = [_entry(Path(path).stem, Path(path)) for path in paths]
+    made = [
+        build(_Made, {key: entry.config.get(key) for key in ("data", "seed")}, f"{os.fspath(path)}, line 1")
+        for entry, path in zip(entries, paths, strict=True)
+    ]
+    for other, path in zip(made, paths, strict=True):
+        if other.data.fingerprint != made[0].data.fingerprint:
+            raise ValueError(
+                f"{os.fspath(path)} is of other data than {os.fspath(paths[0])}: "
+                f"{other.data.name} and {made[0].data.name}; compare files of the same data"
+            )
+    return Table(
+        title="Predictions",
+        data=made[0].data.name,
+        seed=made[0].seed,
+        starts=0,
+        entries=_with_identity(entries),
+    )
+
+
+def read_index(folder: str | os.PathLike[str]) -> Index:
+    """What `run` noted of a table.
+
+    Raises
+    ------
+    FileNotFoundError
+        No table was run there.
+    ValueError
+        The note is damaged.
+    """
+    path = Path(folder) / _INDEX
+    if not path.is_file():
+        raise FileNotFoundError(f"{os.fspath(folder)}: no table was run there; run `hybridreg table` first")
+    return build(Index, read_json(path), str(path))
+
+
+def _entry(name: str, path: Path) -> Entry:
+    read = store.read(path)
+    return Entry(name=name, rows=read.rows, config=read.config)
+
+
+def _with_identity(entries: list[Entry]) -> list[Entry]:
+    longest = max((entry.rows for entry in entries), key=len, default=[])
+    if not longest:
+        raise ValueError("there are no rows yet; run `hybridreg table` or `hybridreg eval` to the end")
+    return [Entry(name=IDENTITY, rows=scoring.identity(longest)), *entries]
+
+
+def _file(folder: Path, name: str) -> Path:
+    return folder / "predictions" / f"{slug(name)}.jsonl"

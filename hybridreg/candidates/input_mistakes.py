@@ -1,0 +1,79 @@
+# SPDX-License-Identifier: MIT
+"""When no pose fits: would one fit the source's mirror image, or the source in another unit?"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hybridreg.classical.overhead.birdseye import BirdsEye
+from hybridreg.classical.voxel import VoxelGrid
+from hybridreg.cloud import PointCloud
+from hybridreg.matches import Correspondences
+from hybridreg.pair import Pair
+from hybridreg.resolution import comparable, size_ratio
+from hybridreg.scene import Scene
+from hybridreg.search.rivals import HOPELESS, seen_at
+from hybridreg.verdict import weigh
+from hybridreg.verdict.confidence import OK
+
+Array = NDArray[np.float64]
+
+# Metres of one unit, and its name.
+_UNITS = ((0.001, "millimetres"), (0.01, "centimetres"), (0.3048, "feet"))
+# Poses that are tried under a mistake: the right one is among the first where the clouds fit well.
+_TRIES = 10
+# Reaches of two clouds of one place, in one unit, differ by less than this factor more often than not.
+_ALIKE = 4.0
+
+
+def explanations(scene: Scene) -> list[str]:
+    """Sentences for the mistakes under which the clouds fit: at most one, of those that make them "ok".
+
+    The pose that was found may be as likely: a room that is nearly its own mirror image tells neither.
+    """
+    for side, factors, sentence in _changes(scene.pair):
+        pair = replace(scene.pair, image=None)
+        if side == "source":
+            pair = replace(pair, source=_changed(pair.source, factors))
+        else:
+            pair = replace(pair, target=_changed(pair.target, factors))
+        if _fit(pair) >= OK:
+            return [sentence]
+    return []
+
+
+def _changes(pair: Pair) -> Iterator[tuple[str, Array, str]]:
+    # Cloud, what its coordinates are multiplied by, and the sentence.
+    ratio = size_ratio(pair.source, pair.target)
+    for metres, unit in _UNITS:
+        for factor, side in ((metres, "source"), (1.0 / metres, "target")):
+            off = abs(np.log(ratio / factor))
+            if off < np.log(_ALIKE) and off < abs(np.log(ratio)):
+                yield (
+                    side,
+                    np.full(3, metres),
+                    f"the clouds fit when the {side} is taken to be in {unit}: multiply its coordinates by {metres:g}",
+                )
+    if comparable(pair.source, pair.target):
+        yield (
+            "source",
+            np.array([1.0, -1.0, 1.0]),
+            "the source fits as its mirror image: was it exported left-handed? Change the sign of one axis",
+        )
+
+
+def _changed(cloud: PointCloud, factors: Array) -> PointCloud:
+    seen = cloud.seen
+    return PointCloud(points=cloud.points * factors, said=seen._replace(places=seen.places * factors))
+
+
+def _fit(pair: Pair) -> float:
+    scene = VoxelGrid()(pair)
+    pose = BirdsEye(tries=_TRIES, again=False)(scene, Correspondences.none(), np.random.default_rng(0))
+    if not pose.found or seen_at(scene, [pose.T], 1)[0].support < HOPELESS:
+        return 0.0
+    return weigh(scene, pose).confidence

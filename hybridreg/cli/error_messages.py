@@ -1,0 +1,102 @@
+# SPDX-License-Identifier: MIT
+"""Errors and warnings as a user of the command line wants them: one sentence on stderr, no traceback."""
+
+from __future__ import annotations
+
+import errno
+import os
+import sys
+import warnings
+from collections.abc import Callable
+from contextlib import suppress
+from functools import wraps
+from typing import ParamSpec
+
+import typer
+
+from hybridreg.cli import stop_signals
+from hybridreg.cli.command_line_cures import spoken
+from hybridreg.cli.console import make_ready
+from hybridreg.cli.memory_errors import lacks_memory, memory_sentence, require_addresses
+
+BAD_INPUT, VERDICT_FAILED = 2, 3
+
+P = ParamSpec("P")
+
+# What to do where a file cannot be written.
+_CURES = {
+    errno.ENOSPC: "make room, then run the same command again",
+    errno.EDQUOT: "make room, then run the same command again",
+    errno.EFBIG: "raise the limit of a file's size (ulimit -f), then run the same command again",
+    errno.EROFS: "name another folder",
+    errno.EACCES: "see to the rights, or name another folder",
+}
+
+
+def plainly(command: Callable[P, None]) -> Callable[P, None]:
+    """Make a command end with one sentence and exit code 2 where the input or the machine is at fault, and with 128 + n
+    where signal n stopped it."""
+
+    @wraps(command)
+    def wrapped(*args: P.args, **kwargs: P.kwargs) -> None:
+        make_ready()
+        with warnings.catch_warnings(), stop_signals.stoppable():
+            warnings.simplefilter("default", UserWarning)
+            # Of workers that are ended early on purpose.
+            warnings.filterwarnings("ignore", message=".*tasks which were still being processed")
+            warnings.showwarning = _show_warning
+            try:
+                require_addresses()
+                command(*args, **kwargs)
+                sys.stdout.flush()  # here, where a full disk behind it can still be told
+            except BrokenPipeError:  # whoever read our output has seen enough
+                raise
+            except KeyboardInterrupt as error:
+                say(f"stopped by {stop_signals.name_of(error)}{stop_signals.how_of(error)}")
+                raise typer.Exit(128 + stop_signals.number_of(error)) from None
+            except Exception as error:
+                _give_up_stdout()
+                if lacks_memory(error):
+                    say(memory_sentence(error))
+                elif isinstance(error, (ValueError, KeyError, OSError, ImportError)):
+                    say(spoken(sentence(error)))
+                else:
+                    raise
+                raise typer.Exit(BAD_INPUT) from None
+
+    return wrapped
+
+
+def say(text: str) -> None:
+    """A line on stderr, where that can take one."""
+    with suppress(OSError):
+        print(f"hybridreg: {text}", file=sys.stderr, flush=True)
+
+
+def sentence(error: BaseException) -> str:
+    """An exception's text on one line."""
+    if isinstance(error, OSError) and error.strerror:
+        cure = _CURES.get(error.errno or 0)
+        # Whatever writes a file of ours names it.
+        name = error.filename or ("standard output" if cure else "")
+        text = f"{name}: {error.strerror}" if name else error.strerror
+        text += f"; {cure}" if cure else ""
+    elif isinstance(error, UnicodeError):  # whose first argument is an encoding
+        text = str(error)
+    else:
+        # str(KeyError) puts quotes around the sentence.
+        text = str(error.args[0]) if error.args else type(error).__name__
+    return " ".join(text.split())
+
+
+def _show_warning(message: Warning | str, *_: object, **__: object) -> None:
+    say(f"warning: {spoken(str(message))}")
+
+
+def _give_up_stdout() -> None:
+    # What could not be written may still be in its buffer, and would be tried again at the end.
+    try:
+        sys.stdout.flush()
+    except OSError:
+        with suppress(OSError, ValueError):
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

@@ -1,0 +1,136 @@
+# SPDX-License-Identifier: MIT
+"""A folder of pairs: a folder each with `source.*`, `target.*`, perhaps `image.*`, and `meta.json`."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from pathlib import Path
+from typing import Any
+
+from hybridreg.config.plain_values import value_of
+from hybridreg.data import content
+from hybridreg.data.dataset import Dataset
+from hybridreg.geometry import se3
+from hybridreg.io.structured import read_json
+from hybridreg.pair import LabelledPair, Pair
+
+# Only these reach the pair: calibrations and checks in a meta.json may hold the pose, or let one compute it.
+_FREE_FACTS = ("kind", "source_sensor", "target_sensor", "licence")
+
+
+class PairFolder(Dataset):
+    """Pairs in the sub-folders of `root`; those that hold neither a source nor a `meta.json` are passed over.
+
+    Parameters
+    ----------
+    root : path
+        `root/<id>/source.*` and `target.*` are clouds of any format that `hybridreg.io` reads, `image.*` is a
+        photograph, and `meta.json` holds `T_target_source`, 4x4, row by row, metres; perhaps `source_viewpoint` and
+        `target_viewpoint`: [x, y, z] where the sensor stood in its cloud's frame, "none", or
+        {"places": [[x, y, z], ...], "of_point": [row of each point's place, ...]}.
+
+    Raises
+    ------
+    FileNotFoundError
+        Saying what is missing and where it must lie.
+    ValueError
+        Two files where one is expected.
+    """
+
+    def __init__(self, root: str | os.PathLike[str]) -> None:
+        folder = Path(root)
+        if not folder.is_dir():
+            raise FileNotFoundError(
+                f"{folder}: there is no such folder; it must hold one folder for each pair"
+            )
+        self.root = folder
+        self._ids = tuple(sorted(f.name for f in folder.iterdir() if _is_pair(f)))
+        if not self.ids:
+            raise FileNotFoundError(
+                f"{folder}: no pairs; each must be a folder {folder.name}/<id>/ with source.*, target.* "
+                "and meta.json"
+            )
+        for name in self.ids:
+            _files(folder / name)
+
+    @property
+    def ids(self) -> tuple[str, ...]:
+        return self._ids
+
+    def load(self, index: int) -> LabelledPair:
+        return load_pair(self.root / self.ids[index])
+
+    def fingerprint(self) -> str:
+        digests = [self.pair_fingerprint(index) for index in range(len(self))]
+        return hashlib.blake2b(repr(digests).encode(), digest_size=8).hexdigest()
+
+    def looks(self) -> str:
+        return content.looks_of_all(file for name in self.ids for file in _files(self.root / name).values())
+
+    def pair_fingerprint(self, index: int) -> str:
+        """Of the content of the pair's own files, so that a folder that grows keeps what was computed of its pairs."""
+        name = self.ids[index]
+        digests = {kind: content.digest(file) for kind, file in _files(self.root / name).items()}
+        total = hashlib.blake2b(repr((name, sorted(digests.items()))).encode(), digest_size=8)
+        return f"{total.hexdigest()}-{name}"
+
+
+def load_pair(folder: Path) -> LabelledPair:
+    """Read the pair of one folder; its name is the pair's id."""
+    files = _files(folder)
+    meta = _read_meta(files["meta"])
+    facts = {key: meta[key] for key in _FREE_FACTS if key in meta}
+    pair = Pair.of(
+        files["source"],
+        files["target"],
+        files.get("image"),
+        id=folder.name,
+        meta=facts,
+        source_viewpoint=_viewpoint(meta, "source"),
+        target_viewpoint=_viewpoint(meta, "target"),
+    )
+    truth = se3.check(meta["T_target_source"], f"{files['meta']}: T_target_source")
+    overlap = value_of(float | None, meta.get("overlap"), f"{files['meta']}: overlap")
+    return LabelledPair(pair=pair, T_target_source=truth, overlap=overlap)
+
+
+def _viewpoint(meta: dict[str, Any], side: str) -> Any:
+    # "none", one place, or places and the row of each point's.
+    place = meta.get(f"{side}_viewpoint", "auto")
+    if isinstance(place, dict):
+        return place.get("places"), place.get("of_point")
+    return place
+
+
+def _is_pair(folder: Path) -> bool:
+    # A hidden folder is one that was being written when its process was killed.
+    if folder.name.startswith("."):
+        return False
+    return folder.is_dir() and ((folder / "meta.json").is_file() or any(folder.glob("source.*")))
+
+
+def _files(folder: Path) -> dict[str, Path]:
+    found = {}
+    for kind in ("source", "target", "image"):
+        candidates = sorted(folder.glob(f"{kind}.*"))
+        if len(candidates) > 1:
+            raise ValueError(f"{folder}: {len(candidates)} files are called {kind}.*; leave one of them")
+        if candidates:
+            found[kind] = candidates[0]
+    if (folder / "meta.json").is_file():
+        found["meta"] = folder / "meta.json"
+    names = {"source": "source.*", "target": "target.*", "meta": "meta.json with T_target_source"}
+    missing = [text for kind, text in names.items() if kind not in found]
+    if missing:
+        raise FileNotFoundError(f"{folder}: {' and '.join(missing)} missing; it must lie in that folder")
+    return found
+
+
+def _read_meta(path: Path) -> dict[str, Any]:
+    meta = read_json(path)
+    if not isinstance(meta, dict) or "T_target_source" not in meta:
+        raise ValueError(
+            f"{path}: T_target_source is missing; it must be the 4x4 pose that maps source to target"
+        )
+    return meta

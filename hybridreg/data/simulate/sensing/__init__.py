@@ -1,0 +1,2 @@
+# SPDX-License-Identifier: MIT
+"""Sensors that look at a simulated scene, and the camera."""

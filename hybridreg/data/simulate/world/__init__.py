@@ -1,0 +1,2 @@
+# SPDX-License-Identifier: MIT
+"""What simulated scenes are made of."""

@@ -1,0 +1,2 @@
+# SPDX-License-Identifier: MIT
+"""What speaks for or against one pose."""

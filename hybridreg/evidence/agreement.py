@@ -1,0 +1,171 @@
+# SPDX-License-Identifier: MIT
+"""What two clouds say about one pose: where both sensors looked, did they see the same surfaces?
+
+A share of all points is a poor judge. Points that the other sensor could not see lower it for a right pose, and the
+ground raises it for a wrong one. So only points that the other sensor looked at are counted, and they are counted
+apart for three directions of normals: the ground holds the height, the walls along a street hold it across, and the
+few surfaces that face along the street decide whether the clouds may slide.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hybridreg.evidence.orientation import overturned
+from hybridreg.evidence.views import View
+from hybridreg.geometry import se3
+from hybridreg.geometry.ground_relief import Alike, alike
+from hybridreg.geometry.main_axes import faced, main_axes
+from hybridreg.geometry.range_image import Seen
+from hybridreg.runtime.cores import query_threads
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+# In units of the evidence's spacing: how near a point must come to count as covered (in space) and as agreeing
+# (across the other surface), how far two ranges of one surface may differ, and how far a surface reaches sideways.
+_COVERED, _ACROSS, _MARGIN, _REACH = 2.0, 0.5, 1.0, 1.0
+# Normals of one surface estimated twice, from different sensors' samples, seldom differ by more than 45 degrees.
+_SAME_NORMAL = float(np.cos(np.radians(45.0)))
+# Points looked at for nothing, added to every count: so few agreeing points are a coincidence.
+FEW = 20.0
+# Without a range image a point counts as looked at where the other cloud has anything within so many spacings.
+_SURROUNDED = 6.0
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class OneWay:
+    """The asked points of one cloud, laid on the other.
+
+    looked : (m,) bool, the other sensor looked at the place or through it
+    free : (m,) bool, it looked through
+    hidden : (m,) bool, something stood before it
+    covered : (m,) bool, the other cloud has a point near by
+    agrees : (m,) bool, covered, on the same surface, with the same normal
+    match : (m,) int64, row of the nearest point of the other cloud where covered, else -1
+    moved, normals : (m, 3) float64, in the other cloud's frame
+    """
+
+    looked: Mask
+    free: Mask
+    hidden: Mask
+    covered: Mask
+    agrees: Mask
+    match: NDArray[np.int64]
+    moved: Array
+    normals: Array
+
+    def of(self, pose: int) -> OneWay:
+        """Of one of several poses, whose fields have a leading axis."""
+        return OneWay(**{field.name: getattr(self, field.name)[pose] for field in fields(self)})
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Agreement:
+    """Both clouds under one pose.
+
+    axes : (3, 3) float64, rows: main directions of the normals in the target's frame, the commonest first
+    looked, agreed, through : (3,) float64, points that face each axis: looked at by the other sensor, agreeing, and
+        looked through; both clouds together
+    relief : Alike
+        Whether the ground rises and falls alike.
+    overturned : bool
+        The world is turned over, or a sensor stands under the other's ground.
+    """
+
+    source: OneWay
+    target: OneWay
+    axes: Array
+    looked: Array
+    agreed: Array
+    through: Array
+    relief: Alike
+    overturned: bool
+
+    @property
+    def shares(self) -> Array:
+        """Agreeing share (3,) of the points looked at, for each axis; few points count for little."""
+        return self.agreed / (self.looked + FEW)
+
+    @property
+    def looked_through(self) -> float:
+        """Share of the points looked at that a sensor looked through."""
+        return float(self.through.sum() / (self.looked.sum() + FEW))
+
+    @property
+    def rare(self) -> tuple[float, float, float]:
+        """Points looked at, agreeing and looked through that do not face the commonest way: on a field, all but the
+        ground."""
+        return float(self.looked[1:].sum()), float(self.agreed[1:].sum()), float(self.through[1:].sum())
+
+
+def compare(source: View, target: View, T_target_source: Array, spacing: float, every: int = 1) -> Agreement:
+    """Evidence for one pose (4, 4), from each cloud's asked points or from `every` so-many-th of them."""
+    return compare_each(source, target, T_target_source[None], spacing, every)[0]
+
+
+def compare_each(source: View, target: View, poses: Array, spacing: float, every: int = 1) -> list[Agreement]:
+    """The same for poses (b, 4, 4): on few points that takes a third of the time that one by one takes."""
+    rows_source, rows_target = source.asked[::every], target.asked[::every]
+    forward = one_way(source, rows_source, target, poses, spacing)
+    backward = one_way(target, rows_target, source, se3.inverse(poses), spacing)
+    own = target.normals[rows_target]
+    facing = (forward.normals, np.broadcast_to(own, (len(poses), *own.shape)))
+    axes = main_axes(*facing)
+    looked, agreed, through = np.zeros((3, len(poses), 3))
+    for way, normals in zip((forward, backward), facing, strict=True):
+        axis = faced(normals, axes)
+        for k in range(3):
+            faces = axis == k
+            looked[:, k] += np.count_nonzero(faces & way.looked, axis=1)
+            agreed[:, k] += np.count_nonzero(faces & way.looked & way.agrees, axis=1)
+            through[:, k] += np.count_nonzero(faces & way.free, axis=1)
+    return [
+        Agreement(
+            source=forward.of(row),
+            target=backward.of(row),
+            axes=axes[row],
+            looked=every * looked[row],
+            agreed=every * agreed[row],
+            through=every * through[row],
+            relief=alike(source.relief, target.relief, T, every),
+            overturned=overturned(source, target, T),
+        )
+        for row, T in enumerate(poses)
+    ]
+
+
+def one_way(a: View, rows: NDArray[np.int64], b: View, T_b_a: Array, spacing: float) -> OneWay:
+    """Lay some rows (m,) of `a` on `b`, under each of some poses (b, 4, 4); the fields have a row for each pose."""
+    moved = se3.apply(T_b_a, a.points[rows])
+    normals = a.normals[rows] @ np.swapaxes(T_b_a[:, :3, :3], 1, 2)
+    limit = _COVERED if b.image is not None else _SURROUNDED
+    threads = query_threads(moved.size // 3)
+    distance, match = b.tree.query(moved, distance_upper_bound=limit * spacing, workers=threads)
+    covered: Mask = np.asarray(distance) < _COVERED * spacing
+    row = np.where(covered, match, 0)
+    other = b.normals[row]
+    across = np.abs(np.einsum("bni,bni->bn", moved - b.points[row], other))
+    parallel = np.abs(np.einsum("bni,bni->bn", normals, other)) > _SAME_NORMAL
+    agrees = covered & (across < _ACROSS * spacing) & parallel
+    if b.image is None:
+        looked = np.isfinite(distance)
+        free = hidden = np.zeros(looked.shape, dtype=bool)
+    else:
+        flat = moved.reshape(-1, 3), normals.reshape(-1, 3)
+        state = b.image.look(*flat, margin=_MARGIN * spacing, reach=_REACH * spacing).reshape(covered.shape)
+        free, hidden = state == Seen.FREE, state == Seen.HIDDEN
+        looked = free | (state == Seen.SEEN)
+    return OneWay(
+        looked=looked,
+        free=free,
+        hidden=hidden,
+        covered=covered,
+        agrees=agrees,
+        match=np.where(covered, match, -1).astype(np.int64),
+        moved=moved,
+        normals=normals,
+    )

@@ -1,0 +1,45 @@
+# SPDX-License-Identifier: MIT
+"""A pose must not turn the world over, nor put a sensor under the ground.
+
+Surfaces alone do not tell: a street laid on a street upside down agrees by the whole of its ground, and what stands on
+it comes to lie where no sensor looked.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hybridreg.evidence.views import View
+from hybridreg.geometry import se3
+
+Array = NDArray[np.float64]
+
+# Grounds whose upper sides face apart so far are turned over; whose upper sides face alike so far can be compared.
+_APART, _ALIKE = -0.5, 0.5
+# How far one ground may lie from the other's plane, as it rises and falls: thicknesses of the ground, and more for each
+# metre away.
+_THICK, _SLOPE = 3.0, 0.15
+
+
+def overturned(source: View, target: View, T_target_source: Array) -> bool:
+    """Whether a pose (4, 4) lays one ground on the underside of the other, or puts a sensor well under the other's
+    ground; False where the clouds do not tell, or gravity is not known."""
+    return _under(source, target, T_target_source) or _under(target, source, se3.inverse(T_target_source))
+
+
+def _under(a: View, b: View, T_b_a: Array) -> bool:
+    # A sensor whose cloud shows no ground, or one on the wrong side of it, may not stand where it is taken to.
+    if a.ground is None or b.ground is None:
+        return False
+    place, other = se3.apply(T_b_a, a.centre[None])[0], b.centre
+    slack = _THICK * b.thickness + _SLOPE * float(np.linalg.norm(place - other))
+    cosine = float(b.ground.up @ T_b_a[:3, :3] @ a.ground.up)
+    if cosine > _ALIKE:
+        return a.image is not None and float(b.ground.above(place[None])[0]) < -slack
+    if cosine > _APART:
+        return False
+    # The foot of one sensor on its own ground, turned over, against the other ground: a ceiling taken for a ground lies
+    # a storey away.
+    foot = place - float(a.ground.above(a.centre[None])[0]) * T_b_a[:3, :3] @ a.ground.up
+    return abs(float(b.ground.above(foot[None])[0])) < slack

@@ -1,0 +1,61 @@
+# SPDX-License-Identifier: MIT
+"""Does the source fit better at another size? A wrong unit, a bad calibration or a stretched map has no right pose."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hybridreg.evidence import views
+from hybridreg.evidence.surface_distance import closeness, fine_surfaces
+from hybridreg.scene import Scene
+from hybridreg.search.settle import descend
+
+Array = NDArray[np.float64]
+
+# Search distances of the steps: spacings of the evidence, then shares of the fine surfaces' farthest partner; points.
+_ROUGHLY, _CLOSELY, _POINTS = (8.0, 5.0, 4.0, 3.0, 2.0, 2.0), (1.0, 0.6, 0.4), 700
+# Width of the weights per search distance.
+_TRUST = 0.25
+# Sizes beyond this are no small error, and not looked for here; nearer to 1 than this they are noise: of 38 right
+# poses, real and simulated, four differ by more, none of which lies more closely at that size.
+_MOST, _LEAST = 1.25, 0.01
+
+
+class Size(NamedTuple):
+    """`scale` to multiply the source by, and how many nats per point more closely it then lies on the target; 0 where
+    that is no gain, or the size is as good as 1."""
+
+    scale: float = 1.0
+    gain: float = 0.0
+
+
+def size(scene: Scene, T_target_source: Array) -> Size:
+    """Size at which the source fits best about a pose (4, 4)."""
+
+    def look() -> Size:
+        T = T_target_source
+        fitted = _fitted(scene, T)
+        scale = float(np.cbrt(np.linalg.det(fitted[:3, :3])))
+        if not _LEAST < abs(np.log(max(scale, 1e-9))) < np.log(_MOST):
+            return Size()
+        gain = closeness(scene, fitted) - closeness(scene, T)
+        return Size(scale, gain) if gain > 0.0 else Size()
+
+    return scene.shared(("verdict", "size", T_target_source.tobytes()), look)
+
+
+def _fitted(scene: Scene, T: Array) -> Array:
+    source, target = views.views(scene)
+    spacing = views.spacing(scene)
+    points = source.points[source.settling[:_POINTS]]
+    M = descend(T, points, target, [_step(reach * spacing, spacing) for reach in _ROUGHLY], sized=True)
+    fine, surfaces = fine_surfaces(scene)
+    steps = [_step(part * surfaces.far, surfaces.noise) for part in _CLOSELY]
+    return descend(M, fine.asked[:_POINTS], surfaces, steps, sized=True)
+
+
+def _step(reach: float, noise: float) -> tuple[float, float]:
+    return reach, max(noise, _TRUST * reach)

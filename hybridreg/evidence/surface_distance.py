@@ -1,0 +1,158 @@
+# SPDX-License-Identifier: MIT
+"""How closely the points of one cloud lie on the surfaces of the other, measured against the sensors' noise.
+
+Along a corridor many poses bring walls onto walls within a surface's tolerance. At the right one the points lie on them
+to a centimetre or two, those on door frames and kerbs too; at a wrong one some centimetres beside. That takes surfaces
+as fine as the clouds show them; their normals are found where a pose asks for them.
+"""
+
+from __future__ import annotations
+
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from hybridreg.cloud import PointCloud
+from hybridreg.geometry import se3
+from hybridreg.geometry.extent import bounds, reach
+from hybridreg.runtime.cores import n_threads
+from hybridreg.scene import Scene
+from hybridreg.search.settle import descend
+
+Array = NDArray[np.float64]
+
+# Metres, for clouds that reach 5 m or further; less in proportion for smaller ones, which are scanned from nearer: grid
+# of the surfaces, noise of a range, and farthest partner. A grid has so many cells along an axis at most.
+_CELL, _NOISE, _NEAR, _FROM = 0.02, 0.03, 0.5, 5.0
+_MOST_CELLS = 2**20
+# Points from which a normal is found; points of a cloud that make surfaces, and that are asked about, at most.
+_NEIGHBOURS, _MOST, _ASKED = 15, 100_000, 1_500
+# Of the steps of settling: farthest partner, of the farthest of all; width of the weights per distance, at least the
+# noise; points.
+_REACHES, _TRUST, _SETTLING = (1.0, 0.7, 0.5, 0.3, 0.2), 0.25, 600
+# Share of the near points that lie anywhere: on what moved, or was seen from one side only.
+_ANYWHERE = 0.2
+# Points looked at for nothing, added to every count: so few close points are a coincidence.
+_FEW = 20.0
+
+
+@dataclass(frozen=True, eq=False)
+class Surfaces:
+    """One cloud, as fine as it is.
+
+    Attributes
+    ----------
+    points : (n, 3) float64, metres
+    tree : KD-tree of the points
+    asked : (m, 3) float64
+        Points that are asked about.
+    scale : float
+        What the lengths above are multiplied by; 1 outdoors.
+    """
+
+    points: Array
+    tree: cKDTree
+    asked: Array
+    scale: float
+    _normals: Array
+    _known: NDArray[np.bool_]
+
+    @property
+    def noise(self) -> float:
+        """Standard deviation of a range, metres."""
+        return _NOISE * self.scale
+
+    @property
+    def far(self) -> float:
+        """Farthest partner of a point, metres."""
+        return _NEAR * self.scale
+
+    def facing(self, rows: NDArray[np.int64]) -> Array:
+        """Normals (k, 3) of some points, found when they are first asked for: of most points none ever is."""
+        new = np.unique(rows[~self._known[rows]])
+        if len(new):
+            near = self.points[self.tree.query(self.points[new], k=min(_NEIGHBOURS, len(self.points)))[1]]
+            centred = near - near.mean(axis=1, keepdims=True)
+            self._normals[new] = np.linalg.eigh(np.swapaxes(centred, 1, 2) @ centred)[1][:, :, 0]
+            self._known[new] = True
+        return self._normals[rows]
+
+
+def closeness(scene: Scene, T_target_source: Array, every: int = 1) -> float:
+    """Nats per point by which a right pose explains the distances across the surfaces better than chance does.
+
+    The log-likelihood of the points that have a partner near by, most of which lie on its surface but for noise, over
+    that of points which lie anywhere near; of the two clouds the greater, as sparse rings make poor surfaces.
+
+    Parameters
+    ----------
+    T_target_source : (4, 4)
+        A pose, or one with a size.
+    every : int
+        So many-th of the points are asked about.
+    """
+
+    def look() -> float:
+        source, target = fine_surfaces(scene)
+        back: Array = np.linalg.inv(T_target_source).astype(np.float64)  # of a pose with a size too
+        return max(
+            _one_way(source.asked[::every], target, T_target_source),
+            _one_way(target.asked[::every], source, back),
+        )
+
+    return scene.shared(("verdict", "closeness", every, T_target_source.tobytes()), look)
+
+
+def settle_closely(scene: Scene, T_target_source: Array) -> Array:
+    """Pose (4, 4) near by at which the source's points lie best on the target's surfaces as fine as these are."""
+    source, target = fine_surfaces(scene)
+    steps = [(part * target.far, max(target.noise, _TRUST * part * target.far)) for part in _REACHES]
+    return descend(T_target_source, source.asked[:_SETTLING], target, steps)
+
+
+def fine_surfaces(scene: Scene) -> tuple[Surfaces, Surfaces]:
+    """Of source and target, made once a run."""
+
+    def make() -> tuple[Surfaces, Surfaces]:
+        clouds = (scene.pair.source, scene.pair.target)
+        scale = min(1.0, *(reach(cloud.radii) / _FROM for cloud in clouds)) or 1.0
+        with ThreadPoolExecutor(min(2, n_threads())) as pool:
+            source, target = pool.map(lambda cloud: _surfaces(cloud, scale), clouds)
+            return source, target
+
+    return scene.shared(("verdict", "fine surfaces"), make)
+
+
+def _surfaces(cloud: PointCloud, scale: float) -> Surfaces:
+    from hybridreg.classical.voxel import voxel_centroids
+
+    rng = np.random.default_rng(0)
+    points = cloud.points
+    if len(points) > _MOST:
+        points = points[np.sort(rng.permutation(len(points))[:_MOST])]
+    low, high = bounds(points)
+    points = voxel_centroids(points, max(_CELL * scale, float((high - low).max()) / _MOST_CELLS))
+    return Surfaces(
+        points=points,
+        tree=cKDTree(points, balanced_tree=False, compact_nodes=False),
+        asked=points[rng.permutation(len(points))[:_ASKED]],
+        scale=scale,
+        _normals=np.zeros_like(points),
+        _known=np.zeros(len(points), dtype=bool),
+    )
+
+
+def _one_way(asked: Array, other: Surfaces, T_other_asked: Array) -> float:
+    far, noise = other.far, other.noise
+    moved = se3.apply(T_other_asked, asked)
+    distance, match = other.tree.query(moved, distance_upper_bound=far)
+    near = np.isfinite(distance)
+    row = match[near]
+    across = np.einsum("ni,ni->n", moved[near] - other.points[row], other.facing(row))
+    # Of distances up to the farthest: a half-normal one of the noise, or any.
+    on_it = np.sqrt(2.0 / np.pi) / noise * np.exp(-0.5 * (across / noise) ** 2)
+    nats = np.log((1.0 - _ANYWHERE) * on_it * far + _ANYWHERE)
+    return float(nats.sum() / (len(nats) + _FEW))

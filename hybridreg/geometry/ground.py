@@ -1,0 +1,163 @@
+# SPDX-License-Identifier: MIT
+"""The ground of one cloud, in whatever way its sensor hung; of a map too, which no single sensor saw."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hybridreg.geometry import se3
+from hybridreg.geometry.extent import radii, reach
+
+if TYPE_CHECKING:
+    from hybridreg.scene import Level, Scene
+
+Array = NDArray[np.float64]
+Weights = NDArray[np.float64]
+
+# Half the thickness of the ground, as a plane follows uneven ground only so well: metres, yet no more than so much of
+# the cloud's reach (rooms), and no less than so many spacings.
+_THICK, _OF_REACH, _SPACINGS = 0.25, 0.03, 0.6
+# Metres: of points that all lie in one place the above are nought.
+_THIN = 1e-9
+# Triples of points tried; how many look best on few points; how many of these are fitted on all.
+_TRIPLES, _LOOKED_AT, _FITTED = 4000, 120, 6
+_FEW, _MANY = 160, 1500
+# Least share of the cloud on the ground less what lies below it.
+_LEAST = 0.1
+# A steep plane, or one far from the sensor, is a wall more often than a ground (in a lane the walls hold several times
+# the points). A sensor hangs more often upright than on its head.
+_STEEP_DEG, _STEEP = 40.0, 0.15
+_FAR_METRES, _FAR, _UPTURNED = 5.0, 0.5, 0.9
+
+
+class Ground(NamedTuple):
+    """A level plane: `up` (3,) unit, towards the sensor; `height` metres of the plane along it."""
+
+    up: Array
+    height: float
+
+    def above(self, points: Array) -> Array:
+        """Heights (n,) of points (n, 3) over the ground, metres."""
+        return points @ self.up - self.height
+
+    @property
+    def levelling(self) -> Array:
+        """(3, 3): the shortest turn that brings `up` to z."""
+        z = np.array([0.0, 0.0, 1.0])
+        axis = np.cross(self.up, z)
+        sine, cosine = float(np.linalg.norm(axis)), float(self.up @ z)
+        direction = axis / sine if sine > 1e-9 else np.array([1.0, 0.0, 0.0])
+        return se3.rotation_about(np.arctan2(sine, cosine) * direction)
+
+
+def on_grid(scene: Scene, voxel: float) -> Scene:
+    """The pair of a scene on the grid on which it is seen from above, made once a run."""
+    from hybridreg.classical.voxel import VoxelGrid
+
+    return scene.shared(("seen from above", voxel), lambda: VoxelGrid(voxel=voxel)(scene.pair))
+
+
+def find(scene: Scene, side: Literal["source", "target"]) -> Ground | None:
+    """Ground of one level, or None where no plane carries enough of the points; see `under`."""
+
+    def look() -> Ground | None:
+        level: Level = getattr(scene, side)
+        return under(level.points, level.viewpoint, level.spacing)
+
+    return scene.shared(("ground", side), look)
+
+
+def under(points: Array, viewpoint: Array | None, spacing: float) -> Ground | None:
+    """Ground of `points` (n, 3), or None where no plane carries enough of them.
+
+    A search over planes through three points, with a seed of its own: the one that holds most points, with few below
+    it, near points counting more (far ground rises and falls). The sensor may hang in any way; where two planes
+    compete, the one under an upright sensor wins.
+
+    Parameters
+    ----------
+    viewpoint : (3,), (k, 3) or None
+        Where the sensor stood, on the upper side of the ground. Without it, up is where the other points are.
+    spacing : float
+        Metres between neighbouring points.
+    """
+    if len(points) < 3:
+        return None
+    rng = np.random.default_rng(0)
+    middle = np.median(points, axis=0) if viewpoint is None else np.atleast_2d(viewpoint).mean(axis=0)
+    points = points[rng.permutation(len(points))[: 4 * _MANY]] - middle
+    seen = viewpoint is not None
+    weights = _nearer_more(points)
+    thick = thickness(points, spacing)
+    ups, heights = _planes(points, rng, seen)
+    for n, kept in ((_FEW, _LOOKED_AT), (_MANY, _FITTED)):
+        scores = _scores(points[:n], weights[:n], ups, heights, thick, seen)
+        best = np.argsort(-scores, kind="stable")[:kept]
+        ups, heights = ups[best], heights[best]
+    found = [_fitted(points, weights, up, float(h), thick, seen) for up, h in zip(ups, heights, strict=True)]
+    if not found:
+        return None
+    ups, heights = np.array([g.up for g in found]), np.array([g.height for g in found])
+    scores = _scores(points, weights, ups, heights, thick, seen)
+    best_one = int(np.argmax(scores))
+    up, height = found[best_one]
+    # Where no plane competes, a steep one needs no more points than another.
+    if scores[best_one] < _LEAST * (_STEEP if _steep(up) else 1.0):
+        return None
+    return Ground(up, height + float(up @ middle))
+
+
+def thickness(points: Array, spacing: float) -> float:
+    """Half the thickness of a cloud's ground, metres: a plane follows uneven ground only so well."""
+    return max(_SPACINGS * spacing, min(_THICK, _OF_REACH * reach(radii(points))), _THIN)
+
+
+def _nearer_more(points: Array) -> Weights:
+    square = np.sum(points**2, axis=1)
+    weights = 1.0 / (1.0 + square / max(float(np.median(square)), 1e-30))
+    return weights / weights.sum()
+
+
+def _planes(points: Array, rng: np.random.Generator, seen: bool) -> tuple[Array, Array]:
+    # Planes through three points, their normals towards the sensor, which is the origin; both ways where it is not.
+    a, b, c = points[rng.integers(0, len(points), (3, _TRIPLES))]
+    normals = np.cross(b - a, c - a)
+    length = np.linalg.norm(normals, axis=1)
+    good = length > 1e-12 * np.max(length, initial=1e-30)
+    ups = normals[good] / length[good, None]
+    heights = np.einsum("ni,ni->n", ups, a[good])
+    if not seen:
+        return np.concatenate([ups, -ups]), np.concatenate([heights, -heights])
+    above = np.where(heights > 0.0, -1.0, 1.0)
+    return ups * above[:, None], heights * above
+
+
+def _scores(points: Array, weights: Weights, ups: Array, heights: Array, thick: float, seen: bool) -> Weights:
+    above = (ups @ points.T - heights[:, None]) / thick  # (B, n)
+    weights = weights / weights.sum()
+    share = (np.abs(above) < 1.0) @ weights - (above < -2.0) @ weights
+    likely = np.where(_steep(ups), _STEEP, 1.0)
+    likely *= np.where(-heights > _FAR_METRES, _FAR, 1.0) if seen else 1.0
+    return share * likely * np.where(ups[:, 2] < 0.0, _UPTURNED, 1.0)
+
+
+def _steep(up: Array) -> Any:
+    # Of one plane (3,) or of many (k, 3).
+    return np.abs(up[..., 2]) < np.cos(np.radians(_STEEP_DEG))
+
+
+def _fitted(points: Array, weights: Weights, up: Array, height: float, thick: float, seen: bool) -> Ground:
+    for width in (2.0, 1.0, 1.0):
+        on = np.abs(points @ up - height) < width * thick
+        if np.count_nonzero(on) < 3:
+            break
+        centre = np.average(points[on], axis=0, weights=weights[on])
+        centred = points[on] - centre
+        normal = np.linalg.eigh((weights[on, None] * centred).T @ centred)[1][:, 0]
+        turned = normal @ centre > 0.0 if seen else normal @ up < 0.0
+        up = -normal if turned else normal
+        height = float(up @ centre)
+    return Ground(up, height)

@@ -1,0 +1,224 @@
+# SPDX-License-Identifier: MIT
+"""What a sensor saw from where it stood: in each direction, how far it looked.
+
+A grid of rows and columns suits one kind of sensor in one orientation. Here the directions themselves are the
+image: returns thinned to cells of equal angle on the sphere, and a KD-tree over them. Rings, fans, rosettes and
+hemispheres, upright or not, are all the same to it, and a turned cloud gives the same answers.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntEnum
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from hybridreg.geometry.extent import radii
+from hybridreg.geometry.extent import reach as reach_of
+from hybridreg.runtime.cores import query_threads
+
+Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+# The finest and coarsest cell, radians: below half a degree two clouds cannot be compared anyway, and beyond
+# four degrees a few stray returns would pass for a field of view.
+_FINEST, _COARSEST = np.radians(0.5), np.radians(4.0)
+# Cells are as wide as the gaps between returns when doubling them covers less than this much more of the sky. It
+# would be 1 for a sharp-edged field of view with even rings; uneven rings and ragged edges add to it.
+_FILLED = 1.5
+_BITS = 12  # of a cell's index along one axis
+# Steeper than this a surface is seen edge-on, degrees: a ray beside the point that goes on may graze the same surface
+# far behind it. Most ground is seen so.
+_EDGE_ON_DEG = 75.0
+# Of a cloud's reach, as in `hybridreg.resolution`.
+_CELLS_ALONG_REACH = 60.0
+# Places from which a cloud was seen, at most: each has an image of its own.
+_MOST_PLACES = 8
+# Two returns of one cell whose ranges differ by less than this share lie on one surface.
+_ONE_SURFACE = 0.1
+
+
+class Seen(IntEnum):
+    """What a sensor tells about a place."""
+
+    UNSEEN = 0  # it did not look there, or nothing came back
+    SEEN = 1  # it got a return from there
+    FREE = 2  # it looked through, and hit something behind
+    HIDDEN = 3  # something before it stood in the way
+
+
+@dataclass(frozen=True, eq=False)
+class RangeImage:
+    """Returns of one cloud by direction.
+
+    Attributes
+    ----------
+    viewpoint : (3,) float64
+    directions : (n, 3) float64, unit length
+    ranges : (n,) float64, metres
+    resolution : float
+        Angle between neighbouring rays across the widest regular gap (between rings), radians.
+    """
+
+    viewpoint: Array
+    directions: Array
+    ranges: Array
+    resolution: float
+    tree: cKDTree
+
+    @classmethod
+    def of(cls, points: Array, viewpoint: Array) -> RangeImage:
+        """Image of `points` (N, 3) about `viewpoint` (3,).
+
+        Raises
+        ------
+        ValueError
+            If no point lies apart from the viewpoint.
+        """
+        ray = points - viewpoint
+        reach = np.sqrt(np.einsum("ni,ni->n", ray, ray))
+        apart = reach > 1e-6
+        if not apart.any():
+            raise ValueError("range image: every point lies at the viewpoint")
+        reach = reach[apart]
+        directions = ray[apart] / reach[:, None]
+        finest = _finest(points[apart], reach)
+        directions, reach = _thin(directions, reach, finest)
+        resolution = angular_resolution(directions, finest)
+        if resolution > 2.0 * finest:
+            directions, reach = _thin(directions, reach, 0.5 * resolution)
+        tree = cKDTree(directions, balanced_tree=False, compact_nodes=False)
+        return cls(np.asarray(viewpoint, dtype=np.float64), directions, reach, resolution, tree)
+
+    def look(
+        self, points: Array, normals: Array | None = None, *, margin: float, reach: float = np.inf, k: int = 4
+    ) -> NDArray[np.int8]:
+        """Tell of each point (m, 3) whether this sensor saw it.
+
+        Parameters
+        ----------
+        normals : (m, 3) or None
+            Of the surfaces that the points lie on; without them a surface is taken to face the sensor at 45 degrees.
+        margin : float
+            Metres by which two ranges of one surface may differ.
+        reach : float
+            Metres that the surface extends sideways from a point. A ray that passes the point further away might
+            miss the surface, and tells nothing.
+        k : int
+            Nearest rays that are asked. One that stops at the point is enough for SEEN; all must go on behind it
+            for FREE, so that a ray beside a narrow thing does not deny it. Of a surface that is seen edge-on none
+            tells FREE.
+
+        Returns
+        -------
+        (m,) int8 of `Seen`
+        """
+        ray = points - self.viewpoint
+        r = np.maximum(np.sqrt(np.einsum("ni,ni->n", ray, ray)), 1e-9)
+        k = min(k, len(self.ranges))
+        angle, index = self.tree.query(
+            ray / r[:, None],
+            k=np.arange(1, k + 1),
+            distance_upper_bound=1.5 * self.resolution,
+            workers=query_threads(len(r)),
+        )
+        sideways = r[:, None] * angle
+        asked = np.isfinite(angle) & (sideways <= reach)
+        behind = self.ranges[np.minimum(index, len(self.ranges) - 1)] - r[:, None]
+        slope, edge_on = _slope(ray / r[:, None], normals)
+        slack = margin + np.where(asked, sideways, 0.0) * slope[:, None]
+        seen = (asked & (np.abs(behind) <= slack)).any(axis=1)
+        through = ~(asked & (behind <= slack)).any(axis=1)
+        beyond = np.where(edge_on, Seen.UNSEEN, Seen.FREE)
+        state = np.where(seen, Seen.SEEN, np.where(through, beyond, Seen.HIDDEN))
+        return np.where(asked.any(axis=1), state, Seen.UNSEEN).astype(np.int8)
+
+
+@dataclass(frozen=True, eq=False)
+class RangeImages:
+    """Range images of a cloud that was seen from several places, each of the points seen from there."""
+
+    images: tuple[RangeImage, ...]
+
+    @classmethod
+    def of(cls, points: Array, places: Array, of_point: Integers) -> RangeImages:
+        """Images of `points` (N, 3) about those `places` (k, 3) from which most were seen.
+
+        `of_point` (N,) is the row of each point's place.
+        """
+        counts = np.bincount(of_point, minlength=len(places))
+        most = [int(k) for k in np.argsort(-counts, kind="stable")[:_MOST_PLACES] if counts[k] > 0]
+        return cls(tuple(RangeImage.of(points[of_point == k], places[k]) for k in most))
+
+    def look(
+        self, points: Array, normals: Array | None = None, *, margin: float, reach: float = np.inf, k: int = 4
+    ) -> NDArray[np.int8]:
+        """As of one image: seen or looked through where any sensor did, hidden only where none did."""
+        states = np.stack(
+            [image.look(points, normals, margin=margin, reach=reach, k=k) for image in self.images]
+        )
+        told = [(states == state).any(axis=0) for state in (Seen.SEEN, Seen.FREE, Seen.HIDDEN)]
+        return np.select(told, [Seen.SEEN, Seen.FREE, Seen.HIDDEN], Seen.UNSEEN).astype(np.int8)
+
+
+def _finest(points: Array, ranges: Array) -> float:
+    # Half of the cells into which the cloud is cut to be compared, as they are seen: of a small thing seen from near by
+    # far finer than of a street.
+    some = points[:: max(1, len(points) // 5_000)]
+    cell = reach_of(radii(some)) / _CELLS_ALONG_REACH
+    return float(np.clip(0.5 * cell / float(np.median(ranges)), 2.0 / (1 << _BITS) * 1.01, _FINEST))
+
+
+def angular_resolution(directions: Array, finest: float = _FINEST) -> float:
+    """Angle in radians at which cells on the sphere are as wide as the gaps between returns (n, 3).
+
+    While cells are finer than the gaps between rings, doubling them doubles the part of the sky that counts as
+    seen; once they are wider it hardly grows. The doubling stops there.
+    """
+    angle = finest
+    cells = np.unique(_cells(directions, angle))
+    while angle < _COARSEST:
+        coarser = np.unique(_merged(cells))
+        if 4 * len(coarser) < _FILLED * len(cells):
+            break
+        angle, cells = 2 * angle, coarser
+    return float(angle)
+
+
+def _cells(directions: Array, angle: float) -> Integers:
+    # A cube grid cut by the sphere: the same in every orientation but for a factor, no poles, no seam.
+    x, y, z = ((np.ascontiguousarray(directions.T) + 1.0) / angle).astype(np.int64)
+    return (x << 2 * _BITS) | (y << _BITS) | z
+
+
+def _merged(cells: Integers) -> Integers:
+    mask = (1 << _BITS) - 1
+    x, y, z = cells >> 2 * _BITS, (cells >> _BITS) & mask, cells & mask
+    return ((x >> 1) << 2 * _BITS) | ((y >> 1) << _BITS) | (z >> 1)
+
+
+def _thin(directions: Array, ranges: Array, angle: float) -> tuple[Array, Array]:
+    # One number to sort by: the cell, then the range in steps of a 16-millionth.
+    steps = (ranges * ((2.0**24 - 1) / ranges.max())).astype(np.int64)
+    cell = _cells(directions, angle)
+    order = np.argsort((cell << 24) | steps)
+    change = np.flatnonzero(np.diff(cell[order]))
+    near = order[np.concatenate([[0], change + 1])]
+    far = order[np.concatenate([change, [len(order) - 1]])]
+    # The farthest return too where it lies on another surface: a cell on an edge must tell of both.
+    kept = np.concatenate([near, far[ranges[far] > (1.0 + _ONE_SURFACE) * ranges[near]]])
+    return directions[kept], ranges[kept]
+
+
+def _slope(rays: Array, normals: Array | None) -> tuple[Array, NDArray[np.bool_]]:
+    # How much the range of a surface changes per metre sideways: the tangent of the angle of incidence; and whether
+    # the surface is seen edge-on.
+    if normals is None:
+        return np.ones(len(rays)), np.zeros(len(rays), dtype=bool)
+    cosine = np.abs(np.einsum("ni,ni->n", rays, normals))
+    least = np.cos(np.radians(_EDGE_ON_DEG))
+    edge_on = cosine < least
+    cosine = np.maximum(cosine, least)
+    return np.sqrt(np.maximum(1.0 - cosine**2, 0.0)) / cosine, edge_on

@@ -1,0 +1,103 @@
+# SPDX-License-Identifier: MIT
+"""Coordinates that are probably no metres: which cloud's, and which unit is likely."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hybridreg.geometry.extent import reach, some
+
+if TYPE_CHECKING:
+    from hybridreg.cloud import PointCloud
+    from hybridreg.pair import Pair
+
+Array = NDArray[np.float64]
+
+_UNITS = ((1e-3, "millimetres"), (1e-2, "centimetres"), (1e3, "kilometres"))
+# Metres that most scans reach, from an object on a table to a street; and the middle of them.
+_SHORTEST, _LONGEST, _USUAL = 0.3, 300.0, 15.0
+# Reaches of two clouds of one place differ by less; and how far the quotient may lie from a unit's.
+_UNLIKE, _NEAR = 25.0, 5.0
+# Degrees of a scan's extent, at most; and how many times as far it then spreads along z, which is in metres.
+_DEGREES, _UPRIGHT = 0.2, 100.0
+_LOOKED_AT = 2_000
+
+
+def doubts(pair: Pair) -> dict[str, str]:
+    """A sentence for each cloud, by "source" and "target", whose coordinates are probably not in metres."""
+    found: dict[str, str] = {}
+    clouds = {"source": pair.source, "target": pair.target}
+    for name, cloud in clouds.items():
+        other = clouds["target" if name == "source" else "source"]
+        text = _degrees(cloud) or _whole_numbers(cloud, other)
+        if text:
+            found[name] = text
+    return found or _unlike(pair)
+
+
+def _degrees(cloud: PointCloud) -> str:
+    points = some(cloud.points)
+    low, middle, high = np.quantile(points[:: max(1, len(points) // 20_000)], [0.05, 0.5, 0.95], axis=0)
+    wide, at = high - low, np.abs(middle + cloud.offset)
+    flat = max(wide[0], wide[1])
+    on_earth = at[0] <= 180.0 and at[1] <= 90.0 and max(at[0], at[1]) > 1.0
+    if not (on_earth and 0.0 < flat < _DEGREES and wide[2] > _UPRIGHT * flat):
+        return ""
+    return (
+        f"x and y lie within {wide[0]:.2g} and {wide[1]:.2g} of ({middle[0]:.6g}, {middle[1]:.6g}), z spreads over "
+        f"{wide[2]:.3g}: longitude and latitude in degrees? Project them to metres first, for example to UTM"
+    )
+
+
+def _is_whole(cloud: PointCloud) -> bool:
+    points = cloud.points
+    few = points[:: max(1, len(points) // _LOOKED_AT)]
+    if not np.array_equal(few, np.round(few)):
+        return False
+    every = some(points)
+    return bool(np.array_equal(every, np.round(every)))
+
+
+def _whole_numbers(cloud: PointCloud, other: PointCloud) -> str:
+    if not _is_whole(cloud):
+        return ""
+    own = reach(cloud.radii)
+    # What the other cloud reaches, in metres, is the best guess of what this one does.
+    aim = reach(other.radii) if not _is_whole(other) and _plausible(other) else _USUAL
+    if own <= 0.0:
+        return ""
+    metres, unit = min(_UNITS[:2], key=lambda each: abs(np.log(own * each[0] / aim)))
+    return (
+        f"every coordinate is a whole number, and it reaches {own:.3g}: probably {unit}; multiply by {metres:g} "
+        "if so, lengths here are metres"
+    )
+
+
+def _plausible(cloud: PointCloud) -> bool:
+    return _SHORTEST <= reach(cloud.radii) <= _LONGEST
+
+
+def _unlike(pair: Pair) -> dict[str, str]:
+    # One cloud in another unit than the other: the one whose reach no sensor has is to blame.
+    reaches = {"source": reach(pair.source.radii), "target": reach(pair.target.radii)}
+    small, large = sorted(reaches, key=lambda name: reaches[name])
+    if reaches[small] <= 0.0 or reaches[large] < _UNLIKE * reaches[small]:
+        return {}
+    ratio = reaches[large] / reaches[small]
+    told = f"{reaches[large]:.3g} m where the {small} reaches {reaches[small]:.3g} m"
+    if _plausible(getattr(pair, large)) and not _plausible(getattr(pair, small)):
+        unit = "kilometres, or scaled to a unit cube" if ratio < 1e3 * _NEAR else "scaled"
+        return {
+            small: f"it reaches {reaches[small]:.3g} m where the {large} reaches {reaches[large]:.3g} m: probably "
+            f"{unit}; lengths here are metres"
+        }
+    likely = [(metres, unit) for metres, unit in _UNITS[:2] if 1 / _NEAR < ratio * metres < _NEAR]
+    if not likely:
+        return {large: f"it reaches {told}: is one of them in another unit, or another place?"}
+    metres, unit = min(likely, key=lambda each: abs(np.log(ratio * each[0])))
+    return {
+        large: f"it reaches {told}: probably {unit}; multiply by {metres:g} if so, lengths here are metres"
+    }

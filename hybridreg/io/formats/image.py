@@ -1,0 +1,168 @@
+# SPDX-License-Identifier: MIT
+"""Photographs in one form: (H, W, 3), uint8, RGB."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from hybridreg.io.faults import fault
+from hybridreg.io.formats.image_size import image_size
+from hybridreg.io.signatures import kind_of
+from hybridreg.io.whole_files import read_whole
+
+_NOT_AN_IMAGE = "give a photograph that an image viewer opens (.png, .jpg, .tif, .bmp, .webp)"
+# The largest sensors of telephones have 200 million; decoded they take 0.6 GB, twice that on the way.
+_MOST_PIXELS = 210_000_000
+_ROWS = 256
+_ROUNDING = 1e-6  # by which a float image may leave [0, 1]
+
+
+def read_image(path: str | os.PathLike[str]) -> NDArray[np.uint8]:
+    """Read a photograph, turned upright as its EXIF orientation says.
+
+    Parameters
+    ----------
+    path : path
+        A file of any kind that OpenCV decodes, whatever its name: grey, colour, with alpha (which is
+        dropped), 8 or 16 bits (of which the full range becomes 0 to 255).
+
+    Returns
+    -------
+    array of shape (H, W, 3), uint8
+        RGB.
+
+    Raises
+    ------
+    FileNotFoundError, IsADirectoryError
+        Nothing, or a folder, lies at `path`.
+    ValueError
+        The file is no image, is truncated, or has more than 210 million pixels, which are not decoded then.
+    """
+    name = str(path)
+    data = _checked(Path(path))
+    pixels = _decode(data)
+    if pixels is None:
+        raise _undecodable(data, name)
+    return as_image(pixels[..., ::-1] if pixels.ndim == 3 else pixels, name)
+
+
+def check_image(path: str | os.PathLike[str]) -> None:
+    """Refuse what is no photograph, is cut short, or has too many pixels, by its header alone.
+
+    Raises
+    ------
+    FileNotFoundError, IsADirectoryError, ValueError
+        As `read_image`, but for damage that only a decoder meets.
+    """
+    _checked(Path(path))
+
+
+def _checked(path: Path) -> bytes:
+    name, data = str(path), read_whole(path)
+    if not data:
+        raise fault(name, "is empty (0 bytes)")
+    if data.startswith(b"\xff\xd8\xff") and not _jpeg_is_whole(data):
+        raise fault(name, f"breaks off within the JPEG data, after {len(data)} bytes")
+    size = image_size(data)
+    if size is None:
+        raise _undecodable(data, name)
+    rows, columns = size
+    if rows * columns > _MOST_PIXELS:
+        problem = f"has {columns} x {rows} pixels, {rows * columns / 1e6:.0f} megapixels"
+        raise fault(
+            name,
+            problem,
+            f"make it smaller: {_MOST_PIXELS / 1e6:.0f} are read, networks look at less than one",
+        )
+    return data
+
+
+def _undecodable(data: bytes, name: str) -> ValueError:
+    kind = kind_of(data)
+    what = f"its content is {kind.words}" if kind else f"begins with {data[:8]!r}"
+    return fault(name, f"cannot be decoded as an image: {what}, {len(data)} bytes", _NOT_AN_IMAGE)
+
+
+def as_image(image: ArrayLike, name: str = "image") -> NDArray[np.uint8]:
+    """Bring pixels to the one form that all stages take.
+
+    Parameters
+    ----------
+    image : array of shape (H, W), (H, W, 1), (H, W, 3) or (H, W, 4)
+        Grey, RGB or RGBA (alpha is dropped); uint8, uint16 (full range) or floats in [0, 1]. OpenCV's own
+        `imread` gives BGR: turn that with `image[..., ::-1]`.
+    name : str
+        What an error message calls it.
+
+    Returns
+    -------
+    array of shape (H, W, 3), uint8
+        RGB, contiguous; a copy.
+
+    Raises
+    ------
+    ValueError
+        Another shape or dtype, no pixels, floats outside [0, 1] or not finite.
+    """
+    pixels = np.asarray(image)
+    if pixels.ndim == 2:
+        pixels = pixels[:, :, None]
+    _check_shape(pixels, name)
+    colour = np.broadcast_to(pixels[:, :, :3], (*pixels.shape[:2], 3))
+    return np.array(_eight_bits(colour, name), dtype=np.uint8, order="C")
+
+
+def _check_shape(pixels: NDArray[Any], name: str) -> None:
+    shape = pixels.shape
+    if pixels.ndim == 3 and shape[2] > 4 and shape[0] in (1, 3, 4):
+        cure = "put the channels last: numpy.moveaxis(image, 0, -1)"
+        raise fault(name, f"has the shape {shape}, channels first", cure)
+    if pixels.ndim != 3 or shape[2] not in (1, 3, 4):
+        raise fault(name, f"has the shape {shape}", "give (H, W), (H, W, 1), (H, W, 3) or (H, W, 4)")
+    if pixels.size == 0:
+        raise fault(name, f"has the shape {shape}, no pixels", "give an image of at least one pixel")
+
+
+def _eight_bits(pixels: NDArray[Any], name: str) -> NDArray[Any]:
+    if pixels.dtype == np.uint8:
+        return pixels
+    if pixels.dtype.kind == "u" and pixels.dtype.itemsize == 2:
+        rounded = np.empty(pixels.shape, dtype=np.uint8)
+        for row in range(0, len(pixels), _ROWS):  # so that no copy of four bytes each is made of all
+            rounded[row : row + _ROWS] = (pixels[row : row + _ROWS].astype(np.uint32) * 255 + 32767) // 65535
+        return rounded
+    if pixels.dtype.kind != "f":
+        cure = "give uint8, uint16 or floats in [0, 1]; for values up to 255 use image.astype(numpy.uint8)"
+        raise fault(name, f"has the dtype {pixels.dtype}", cure)
+    low, high = float(pixels.min()), float(pixels.max())
+    if not (low >= -_ROUNDING and high <= 1 + _ROUNDING):  # written so that NaN fails it
+        raise fault(
+            name, f"has floats from {low:g} to {high:g}, not in [0, 1]", "divide it by its full scale"
+        )
+    return np.rint(np.clip(pixels, 0, 1) * 255)
+
+
+def _decode(data: bytes) -> NDArray[Any] | None:
+    import cv2
+
+    # ANYDEPTH keeps 16 bits for our own rounding; COLOR turns the image upright, which UNCHANGED does not.
+    try:
+        return cv2.imdecode(np.frombuffer(data, dtype=np.uint8), cv2.IMREAD_COLOR | cv2.IMREAD_ANYDEPTH)
+    except (cv2.error, MemoryError):
+        return None
+
+
+def _jpeg_is_whole(data: bytes) -> bool:
+    """Whether the end mark follows the pixels: OpenCV 4 fills what a truncated JPEG lacks with grey."""
+    place = 2
+    while place + 4 <= len(data) and data[place] == 0xFF:
+        marker = data[place + 1]
+        if marker == 0xDA:  # start of scan; from here on the end mark cannot stand for anything else
+            return data.find(b"\xff\xd9", place) >= 0
+        place += 1 if marker == 0xFF else 2 + int.from_bytes(data[place + 2 : place + 4], "big")
+    return False

@@ -1,0 +1,49 @@
+# SPDX-License-Identifier: MIT
+"""LAS and LAZ files through laspy."""
+
+from __future__ import annotations
+
+import io
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hybridreg.io.faults import fault, foreign_parser
+from hybridreg.io.formats.las_header import check_las_header
+from hybridreg.io.formats.las_units import in_metres
+from hybridreg.io.record_fields import stack_axes
+
+_CHUNK = 64 * 2**20  # bytes, so that memory grows with what a LAZ file holds, not with what it promises
+
+
+def parse_las(data: bytes, name: str) -> NDArray[np.float64]:
+    """Read x, y and z of a LAS or LAZ file, scaled and offset as its header says; shape (N, 3), metres.
+
+    Feet are converted with a warning, and degrees refused, where the coordinate reference system tells them.
+    """
+    laspy = _laspy()
+    promise = check_las_header(data, name)
+    chunk_points = max(_CHUNK // promise.point_size, 1)
+    with foreign_parser(name, "a LAS or LAZ file"):
+        # One thread: lazrs' parallel reader allocates what a damaged table of chunks says, and dies of it.
+        backends = [laspy.LazBackend.Lazrs, laspy.LazBackend.Laszip]
+        with laspy.open(io.BytesIO(data), laz_backend=backends, read_evlrs=False) as reader:
+            records = list(reader.header.vlrs)
+            chunks = [stack_axes(*_axes(chunk)) for chunk in reader.chunk_iterator(chunk_points)]
+        points = np.concatenate(chunks) if chunks else np.empty((0, 3))
+    if len(points) != promise.points:
+        raise fault(name, f"its header promises {promise.points} points, it holds {len(points)}")
+    return in_metres(points, records, name)
+
+
+def _axes(chunk: Any) -> tuple[NDArray[np.float64], ...]:
+    return tuple(np.asarray(axis) for axis in (chunk.x, chunk.y, chunk.z))
+
+
+def _laspy() -> Any:
+    try:
+        import laspy
+    except ImportError as error:
+        raise ImportError(f"LAS files need laspy, run `pip install 'hybridreg[las]'` ({error})") from error
+    return laspy

@@ -1,0 +1,61 @@
+# SPDX-License-Identifier: MIT
+"""NumPy's npz archives: which of their arrays is the cloud."""
+
+from __future__ import annotations
+
+import io
+import zipfile
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hybridreg.io.arrays import array_points
+from hybridreg.io.faults import fault, foreign_parser
+from hybridreg.io.formats.npy import array_of_npy, npy_header
+
+_KEYS = ("xyz", "points", "arr_0")
+# Coordinates hardly compress (up to 20 times on a coarse grid); noise of zeros compresses a thousandfold.
+_MODEST, _MOST_EXPANSION = 2**28, 200
+_LONGEST_HEADER = 16384  # numpy itself refuses headers above 10000 bytes
+
+
+def parse_npz(data: bytes, name: str) -> NDArray[np.float64]:
+    """Read the array `xyz`, else `points`, else `arr_0`, else the only (N, 3 or more) one; shape (N, 3)."""
+    with foreign_parser(name, "a zip archive of arrays"):
+        archive = zipfile.ZipFile(io.BytesIO(data))
+    with archive:
+        key = _cloud_key(archive, name)
+        _refuse_bomb(archive.getinfo(f"{key}.npy"), f"{name} (array {key!r})")
+        with foreign_parser(name, "a zip archive of arrays"):
+            content = archive.read(f"{key}.npy")
+    label = f"{name} (array {key!r})"
+    return array_points(array_of_npy(content, label), label)
+
+
+def _refuse_bomb(member: zipfile.ZipInfo, label: str) -> None:
+    # zipfile unpacks no more than the directory promises, so the promise is what has to be believable.
+    packed, unpacked = member.compress_size, member.file_size
+    if unpacked > _MODEST and unpacked > _MOST_EXPANSION * packed:
+        raise fault(label, f"would unpack from {packed} to {unpacked} bytes, as no cloud does")
+
+
+def _cloud_key(archive: zipfile.ZipFile, name: str) -> str:
+    keys = [member[:-4] for member in archive.namelist() if member.endswith(".npy")]
+    for key in _KEYS:
+        if key in keys:
+            return key
+    shapes = {key: _shape(archive, key, name) for key in keys}
+    fitting = [key for key, shape in shapes.items() if len(shape) == 2 and shape[1] >= 3]
+    if len(fitting) != 1:
+        held = ", ".join(f"{key} {shape}" for key, shape in shapes.items()) or "no array"
+        problem = f"has no array {' or '.join(_KEYS)}, and {len(fitting)} of shape (N, 3) under other names"
+        raise fault(name, f"{problem}; it holds {held[:200]}", "save the cloud as the array 'xyz'")
+    return fitting[0]
+
+
+def _shape(archive: zipfile.ZipFile, key: str, name: str) -> tuple[int, ...]:
+    label = f"{name} (array {key!r})"
+    with foreign_parser(label, "a zip archive of arrays"), archive.open(f"{key}.npy") as member:
+        head = member.read(_LONGEST_HEADER)
+    shape, _, _, _ = npy_header(head, label)
+    return shape

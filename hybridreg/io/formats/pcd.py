@@ -1,0 +1,84 @@
+# SPDX-License-Identifier: MIT
+"""PCD files: x, y and z of each point, in any of the three encodings."""
+
+from __future__ import annotations
+
+from itertools import accumulate
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hybridreg.io.faults import fault
+from hybridreg.io.formats.lzf import lzf_decompress
+from hybridreg.io.formats.pcd_header import PcdHeader, parse_pcd_header
+from hybridreg.io.formats.text_rows import parse_rows, promised_lines, text_lines
+from hybridreg.io.record_fields import XyzRecord, axis_columns, stack_axes
+
+_MOST_EXPANSION = 88  # three bytes of LZF make at most 264
+
+
+def parse_pcd(data: bytes, name: str) -> NDArray[np.float64]:
+    """Read x, y and z of a PCD file: ascii, binary or binary_compressed; shape (N, 3).
+
+    The points stay in the frame in which they are stored; VIEWPOINT, the sensor's place in it, is told by
+    `pcd_viewpoint`. An organised cloud keeps its
+    rows in order, empty pixels as NaN. Source: the Point Cloud Library's description of PCD 0.7.
+    """
+    header = parse_pcd_header(data, name)
+    columns = axis_columns(header.fields, name)
+    if any(header.counts[column] != 1 for column in columns):
+        raise fault(name, "x, y or z has a COUNT other than 1", "export the file with one number for each")
+    if header.encoding == "ascii":
+        return _ascii_points(data, header, columns, name)
+    if header.encoding == "binary":
+        record = XyzRecord.of(header.codes, header.sizes, columns)
+        return record.points(data, header.body, header.points, name)
+    return _compressed_points(data, header, columns, name)
+
+
+def pcd_viewpoint(data: bytes, name: str) -> NDArray[np.float64] | None:
+    """Where the sensor stood, (3,) in the frame of the points; None where the header tells nothing but the origin."""
+    place = parse_pcd_header(data, name).viewpoint
+    return None if place is None else np.array(place)
+
+
+def _ascii_points(
+    data: bytes, header: PcdHeader, columns: tuple[int, int, int], name: str
+) -> NDArray[np.float64]:
+    lines = promised_lines(text_lines(data[header.body :]), 0, header.points, sum(header.counts), name)
+    places = [0, *accumulate(header.counts)]
+    x, y, z = columns
+    return parse_rows(lines, (places[x], places[y], places[z]), name)
+
+
+def _compressed_points(
+    data: bytes, header: PcdHeader, columns: tuple[int, int, int], name: str
+) -> NDArray[np.float64]:
+    if header.points == 0:
+        return np.empty((0, 3))
+    raw = _decompressed(data, header, sum(header.sizes), name)
+    # All values of the first field come first, then all of the second.
+    starts = [0, *accumulate(size * header.points for size in header.sizes)]
+    x, y, z = (
+        np.frombuffer(raw, dtype=header.codes[column], count=header.points, offset=starts[column])
+        for column in columns
+    )
+    return stack_axes(x, y, z)
+
+
+def _decompressed(data: bytes, header: PcdHeader, point_size: int, name: str) -> bytes:
+    body = data[header.body :]
+    if len(body) < 8:
+        raise fault(name, f"holds {len(body)} bytes after its header, the sizes of its data alone take 8")
+    packed, unpacked = (int(number) for number in np.frombuffer(body, dtype="<u4", count=2))
+    if unpacked != header.points * point_size:
+        promise = f"its header promises {header.points} points of {point_size} bytes"
+        raise fault(name, f"{promise}, its data announce {unpacked} bytes")
+    if packed > len(body) - 8:
+        raise fault(name, f"announces {packed} compressed bytes, it holds {len(body) - 8}")
+    if unpacked > packed * _MOST_EXPANSION:
+        raise fault(name, f"its {packed} compressed bytes cannot hold the {unpacked} bytes they announce")
+    try:
+        return lzf_decompress(body[8 : 8 + packed], unpacked)
+    except ValueError as error:
+        raise fault(name, str(error)) from error

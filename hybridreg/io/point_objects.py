@@ -1,0 +1,160 @@
+# SPDX-License-Identifier: MIT
+"""Objects that hold points, as drivers, kits and tools hand them out: known by what they have, without imports."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, NoReturn
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hybridreg.io import ros_messages, tables
+from hybridreg.io.arrays import TOGETHER, array_points
+from hybridreg.io.formats.las_units import in_metres
+
+Array = NDArray[np.float64]
+
+# Where objects keep their points: pypcd, dev kits and laspy, Open3D and most others, torch_geometric, trimesh's clouds.
+_HOLD = ("pc_data", "xyz", "points", "pos", "positions", "vertices")
+_DEEPEST = 3
+_CURE = "pass an array of shape (N, 3), such as numpy.column_stack([x, y, z])"
+
+
+def points_of(x: Any, name: str, depth: int = 0) -> Array:
+    """Coordinates (N, 3), a copy, of whatever holds them; what is masked or missing is NaN.
+
+    Raises
+    ------
+    ValueError
+        Nothing there holds points, or it is a mesh, which is no cloud; the message tells what to pass instead.
+    """
+    if isinstance(x, np.ndarray):
+        return _from_array(x, name)
+    if hasattr(x, "detach") and hasattr(x, "cpu"):
+        return _from_torch(x, name)
+    if ros_messages.is_cloud(x):
+        return ros_messages.points(x, name)
+    if hasattr(x, "point") and hasattr(
+        x, "to_legacy"
+    ):  # Open3D tensor cloud; one without points has no positions
+        return _from_array(
+            x.point["positions"].cpu().numpy() if "positions" in x.point else np.empty((0, 3)), name
+        )
+    names = tables.labels(x)
+    if names is not None:
+        return _from_table(x, names, name, depth)
+    _refuse_mesh(x, name)
+    if hasattr(getattr(x, "header", None), "vlrs") and hasattr(x, "xyz"):  # laspy
+        return in_metres(_from_array(np.asarray(x.xyz), name), x.header.vlrs, name)
+    held = _held(x)
+    if held is not None and depth < _DEEPEST:
+        return points_of(held, name, depth + 1)
+    if all(hasattr(x, axis) for axis in "xyz"):  # laspy's records
+        return tables.points({axis: getattr(x, axis) for axis in "xyz"}, list("xyz"), name)
+    if isinstance(x, (list, tuple)) and x and not isinstance(x[0], (list, np.ndarray, int, float)):
+        rows = _named_rows(x)
+        if rows is not None:
+            return points_of(rows, name, depth + 1)
+    return _from_array(_as_array(x, name), name)
+
+
+def _from_array(array: NDArray[Any], name: str, batched: bool = False) -> Array:
+    if array.size == 0:
+        raise ValueError(f"{name}: the cloud is empty (shape {array.shape}); it needs at least 20 points")
+    return array_points(array, name, batched=batched)
+
+
+def _from_torch(x: Any, name: str) -> Array:
+    x = x.detach().cpu()
+    x = x.to_dense() if str(getattr(x, "layout", "")).startswith("torch.sparse") else x
+    # numpy has no bfloat16, and float64 holds every other float exactly.
+    return _from_array(
+        (x.double() if x.is_floating_point() else x.resolve_conj()).numpy(), name, batched=True
+    )
+
+
+def _from_table(x: Any, names: list[Any], name: str, depth: int) -> Array:
+    for first in ("collect", "compute"):
+        if callable(getattr(x, first, None)) and not hasattr(x, "data_vars") and not hasattr(x, "dims"):
+            _refuse(x, name, f"it is not computed yet; pass what its {first}() returns")
+    if "geometry" in names and hasattr(x, "get_coordinates"):
+        _refuse(x, name, "pass x.get_coordinates(include_z=True)")
+    lowered = [str(each).lower() for each in names]
+    if "x" not in lowered and depth < _DEEPEST and isinstance(x, Mapping):
+        together = next(
+            (names[lowered.index(each)] for each in (*TOGETHER, "arr_0") if each in lowered), None
+        )
+        if together is not None:
+            return points_of(x[together], name, depth + 1)
+    return tables.points(x, names, name)
+
+
+def _held(x: Any) -> Any:
+    for attribute in _HOLD:
+        held = getattr(x, attribute, None)
+        held = held() if callable(held) else held  # small_gicp's points are a method
+        if held is not None:
+            return held
+    if hasattr(x, "elements") and hasattr(x, "obj_info"):  # plyfile
+        return x["vertex"].data
+    data = getattr(x, "data", None)
+    if isinstance(data, np.ndarray) and data.dtype.names:  # one element of it
+        return data
+    if hasattr(x, "__cuda_array_interface__") and hasattr(x, "get"):  # cupy
+        return x.get()
+    if callable(getattr(x, "cpu", None)) and callable(getattr(x, "numpy", None)):  # Open3D's own tensors
+        return x.cpu().numpy()
+    return None
+
+
+def _named_rows(rows: Any) -> Any:
+    # What is read by position is read wrongly where the rows tell names.
+    first = rows[0]
+    if isinstance(first, Mapping):
+        return {key: [row.get(key) for row in rows] for key in first}
+    if isinstance(first, np.void) and first.dtype.names:
+        return np.array(rows, dtype=first.dtype)
+    if hasattr(first, "_fields"):
+        return {key: [row[k] for row in rows] for k, key in enumerate(first._fields)}
+    if all(hasattr(first, axis) for axis in "xyz"):
+        return {axis: [getattr(row, axis) for row in rows] for axis in "xyz"}
+    return None
+
+
+def _refuse_mesh(x: Any, name: str) -> None:
+    if hasattr(x, "geometry") and callable(getattr(x, "to_mesh", None)):
+        _refuse(x, name, "a scene is no cloud; sample its surfaces: x.to_mesh().sample(100_000)")
+    if not any(hasattr(x, each) for each in ("triangles", "triangle", "faces")) or _has_no_faces(x):
+        return
+    sample = "sample_points_uniformly" if hasattr(x, "sample_points_uniformly") else "sample"
+    where = (
+        'x.vertex["positions"]'
+        if hasattr(x, "vertex")
+        else "x.vertices"
+        if hasattr(x, "vertices")
+        else "x.points"
+    )
+    how = f"sample its surface, x.{sample}(100_000)" if hasattr(x, sample) else "sample its surface"
+    _refuse(x, name, f"a mesh is no cloud; {how}, or pass its vertices, {where}, where they lie densely")
+
+
+def _has_no_faces(x: Any) -> bool:
+    if hasattr(x, "n_cells") and hasattr(x, "n_verts"):  # VTK counts points as cells
+        return bool(x.n_cells == x.n_verts)
+    faces = getattr(x, "faces", None)
+    return faces is not None and not callable(faces) and len(faces) == 0
+
+
+def _as_array(x: Any, name: str) -> NDArray[Any]:
+    if isinstance(x, (bytes, bytearray)):
+        _refuse(x, name, "bytes tell no type; pass numpy.frombuffer(x, dtype).reshape(-1, 3)")
+    array = np.ma.asarray(x) if np.ma.isMaskedArray(x) else np.asarray(x)
+    if array.ndim == 0 and array.dtype.kind in "OUS":
+        read = callable(getattr(x, "read", None))
+        _refuse(x, name, "pass what its read() returns" if read else _CURE)
+    return array
+
+
+def _refuse(x: Any, name: str, cure: str) -> NoReturn:
+    raise ValueError(f"{name}: cannot read points from {type(x).__module__}.{type(x).__name__}: {cure}")

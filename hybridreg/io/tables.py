@@ -1,0 +1,107 @@
+# SPDX-License-Identifier: MIT
+"""Tables of points, whoever made them: columns called x, y and z of pandas, polars, pyarrow, xarray or a dictionary."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hybridreg.io.arrays import array_points
+from hybridreg.io.column_names import axes_in, find_axes
+from hybridreg.io.faults import fault, shorten
+from hybridreg.io.record_fields import stack_axes
+
+Array = NDArray[np.float64]
+
+# What pandas, polars and pyarrow call the columns of a file without names.
+_UNNAMED = re.compile(r"(column_?|f|v|_)?\d+", re.IGNORECASE)
+
+
+def labels(x: Any) -> list[Any] | None:
+    """Names of a table's columns; None for what is no table."""
+    if isinstance(x, Mapping):
+        return list(x.keys())
+    if hasattr(x, "data_vars"):  # xarray's Dataset, where x may be a coordinate of its own
+        return [*x.data_vars, *(each for each in x.coords if each not in x.data_vars)]
+    if hasattr(x, "dims") and hasattr(x, "coords"):
+        along = _along(x)
+        return None if along is None else [str(each) for each in x.coords[along].values]
+    if hasattr(x, "column") and hasattr(x, "schema"):  # pyarrow
+        return list(x.schema.names)
+    if hasattr(x, "columns") and hasattr(x, "__getitem__"):
+        return list(x.columns)
+    return None
+
+
+def points(x: Any, names: list[Any], name: str) -> Array:
+    """x, y and z by their names (`hybridreg.io.column_names`); by position where no column was named; shape (N, 3).
+
+    What is missing becomes NaN.
+
+    Raises
+    ------
+    ValueError
+        No columns, or several, that may be x, y and z; columns of unequal length, or of no numbers.
+    """
+    told = [str(each[-1]) if isinstance(each, tuple) else str(each) for each in names]
+    if len(names) >= 3 and all(_UNNAMED.fullmatch(each) for each in told) and find_axes(told, name) is None:
+        # Positions again: the first may count the rows.
+        return array_points(
+            np.column_stack([_numbers(x, k, names, name) for k in range(min(4, len(names)))]), name
+        )
+    axes = axes_in(told, name)
+    columns = [_numbers(x, k, names, name) for k in axes.columns]
+    if len({len(column) for column in columns}) > 1:
+        lengths = ", ".join(str(len(column)) for column in columns)
+        raise fault(name, f"x, y and z have the lengths {lengths}", "give them equally long")
+    axes.tell(name)
+    found = stack_axes(*columns)
+    return found if axes.metres == 1.0 else found * axes.metres
+
+
+def _along(x: Any) -> Any:
+    # The dimension of xarray's DataArray whose labels are the axes.
+    for each in x.dims:
+        if each in x.coords and {"x", "y", "z"} <= {
+            str(label).lower() for label in x.coords[each].values[:50]
+        }:
+            return each
+    return None
+
+
+def _column(x: Any, k: int, names: list[Any]) -> Any:
+    if hasattr(x, "iloc"):  # pandas, where two columns may have one name
+        return x.iloc[:, k]
+    if hasattr(x, "column") and hasattr(x, "schema"):
+        return x.column(k)
+    if not isinstance(x, Mapping) and not hasattr(x, "data_vars") and hasattr(x, "dims"):
+        return x.isel({_along(x): k}).values
+    return x[names[k]]
+
+
+def _numbers(x: Any, k: int, names: list[Any], name: str) -> Array:
+    """Column `k` as float64, (N,)."""
+    values = _column(x, k, names)
+    if hasattr(values, "detach"):
+        values = values.detach().cpu()
+    try:
+        return np.ravel(_floats(values))
+    except (TypeError, ValueError) as error:
+        problem = f"column {shorten(names[k])} holds something else than numbers ({shorten(error)})"
+        raise fault(name, problem, "convert it to float") from error
+
+
+def _floats(values: Any) -> NDArray[Any]:
+    if hasattr(values, "to_numpy"):
+        try:
+            return np.asarray(
+                values.to_numpy(dtype=np.float64, na_value=np.nan)
+            )  # pandas' nullable types too
+        except TypeError:
+            values = values.to_numpy()  # polars, pyarrow: a null makes floats of it, with NaN
+    array = values if np.ma.isMaskedArray(values) else np.asarray(values)
+    return np.ma.filled(array.astype(np.float64), np.nan)

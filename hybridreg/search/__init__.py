@@ -1,0 +1,2 @@
+# SPDX-License-Identifier: MIT
+"""From one rough pose to the best supported ones about it."""

@@ -1,0 +1,61 @@
+# SPDX-License-Identifier: MIT
+"""The best supported of the places near a pose where surfaces let it rest.
+
+Where clouds share a wall and a few things, a pose rests at several places some decimetres or degrees apart, and comes
+to the one that lies nearest to where it began; the support tells which of them is right.
+"""
+
+from __future__ import annotations
+
+from itertools import cycle
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hybridreg.evidence import support, views
+from hybridreg.evidence.surface_distance import closeness, settle_closely
+from hybridreg.geometry import se3
+from hybridreg.resolution import map_cell
+from hybridreg.scene import Scene
+from hybridreg.search.rivals import Rival, seen_at
+from hybridreg.search.settle import settle
+
+Array = NDArray[np.float64]
+
+# Hops from each pose, and the standard deviations of one: degrees about each axis; along it, in turn, spacings, which
+# count as so much of a map's cell at least.
+_HOPS, _TURN_DEG, _SHIFTS, _LEAST = 10, 3.0, (1.0, 4.0), 0.3
+# So many-th of the settling points, of the asked points, and of those asked about closely are used.
+_SETTLING, _LOOKING, _CLOSELY = 3, 3, 4
+
+
+def hop(scene: Scene, poses: Array, rng: np.random.Generator) -> list[Rival]:
+    """Where basin hopping (Wales and Doye 1997) for more support ends that begins at each of some poses (b, 4, 4).
+
+    A pose is shaken, settles anew, roughly and closely, and stays where it has more support and lies closer.
+    """
+    source, target = views.views(scene)
+    spacing = views.spacing(scene)
+    middle = source.points.mean(axis=0)
+    step = max(spacing, _LEAST * map_cell(scene.pair.source, scene.pair.target))
+
+    def seen(poses: Array) -> Array:
+        close = [support.beside(0.0, closeness(scene, T, _CLOSELY)) for T in poses]
+        return np.array(support.of_each(source, target, poses, spacing, _LOOKING)) + close
+
+    poses, best = poses.copy(), seen(poses)
+    for _, shift in zip(range(_HOPS), cycle(_SHIFTS), strict=False):
+        starts = np.array([_shaken(T, middle, shift * step, rng) for T in poses])
+        roughly = settle(source, target, starts, spacing, every=_SETTLING)
+        for settled in (roughly, settle_closely(scene, roughly)):
+            value = seen(settled)
+            better = value > best
+            poses[better], best[better] = settled[better], value[better]
+    return seen_at(scene, poses, 1)
+
+
+def _shaken(T: Array, middle: Array, shift: float, rng: np.random.Generator) -> Array:
+    # About the middle of the source, so that a turn leaves it where it is.
+    centre = se3.apply(T, middle[None])[0]
+    turn = se3.rotation_about(np.radians(rng.normal(0.0, _TURN_DEG, 3)))
+    return se3.about(centre, turn, rng.normal(0.0, shift, 3)) @ T

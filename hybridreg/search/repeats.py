@@ -1,0 +1,95 @@
+# SPDX-License-Identifier: MIT
+"""Where else near a pose do the same things stand? Rows, racks, ribs, and maps that hold a place twice."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hybridreg.evidence.views import View
+from hybridreg.geometry import se3
+from hybridreg.geometry.main_axes import faced
+
+Array = NDArray[np.float64]
+
+# Edge of a cell and farthest shift, in spacings: up to 10 m outdoors, a metre in a room.
+_CELL, _FARTHEST = 1.0, 20.0
+# Turns that are tried with each shift, degrees; points that are shifted; the share of those that meet at the pose which
+# must meet elsewhere.
+_TURNS_DEG, _POINTS, _SHARE = (-3.0, -1.5, 0.0, 1.5, 3.0), 400, 0.4
+# Shifts returned, and how far apart they lie at least, in cells.
+_MOST, _APART = 4, 2
+# Fewest points that tell of a place.
+_FEWEST = 20
+
+
+def copies(source: View, target: View, T_target_source: Array, axes: Array, spacing: float) -> list[Array]:
+    """Poses (4, 4) beside a pose, shifted along the commonest surface, at which nearly as many things meet.
+
+    Things are points that do not face the commonest way `axes[0]` (on a street, all but its ground); two meet in one
+    cell of a grid.
+    """
+    frame = np.vstack([axes[1:], axes[:1]])  # the commonest direction last
+    cell = _CELL * spacing
+    rows = source.settling[faced(source.normals[source.settling] @ T_target_source[:3, :3].T, axes) > 0]
+    things = se3.apply(T_target_source, source.points[rows[:_POINTS]])
+    other = target.points[faced(target.normals, axes) > 0]
+    if len(things) < _FEWEST or len(other) < _FEWEST:
+        return []
+    middle = things.mean(axis=0)
+    reach = round(_FARTHEST / _CELL)
+    arms, others = things - middle, (other - middle) @ frame.T
+    near = np.abs(others).max(axis=1) < np.linalg.norm(arms, axis=1).max() + 2 * reach * cell
+    if not near.any():
+        return []
+    held, origin = _grid(others[near], cell, reach)
+    met = np.stack(
+        [_met(_turned(arms, axes[0], deg) @ frame.T, held, origin, cell, reach) for deg in _TURNS_DEG]
+    )
+    best, turn = met.max(axis=0), met.argmax(axis=0)
+    peaks = _peaks(best, max(_SHARE * best[reach, reach], 0.5 * _FEWEST))
+    poses = []
+    for i, j in peaks:
+        shift = cell * np.array([i - reach, j - reach, 0]) @ frame
+        turned = se3.rotation_about(np.radians(_TURNS_DEG[turn[i, j]]) * axes[0])
+        poses.append(se3.about(middle, turned, shift) @ T_target_source)
+    return poses
+
+
+def _peaks(met: NDArray[np.int64], least: float) -> list[tuple[int, int]]:
+    # Cells that hold no less than those around, the fullest first, without the pose itself in the middle.
+    from scipy.ndimage import maximum_filter
+
+    middle = len(met) // 2
+    peak = (met == maximum_filter(met, 2 * _APART + 1, mode="constant")) & (met >= least)
+    peak[middle - _APART : middle + _APART + 1, middle - _APART : middle + _APART + 1] = False
+    i, j = np.nonzero(peak)
+    order = np.argsort(-met[i, j], kind="stable")[:_MOST]
+    return list(zip(i[order].tolist(), j[order].tolist(), strict=True))
+
+
+def _turned(arms: Array, axis: Array, degrees: float) -> Array:
+    return arms @ se3.rotation_about(np.radians(degrees) * axis).T
+
+
+def _grid(points: Array, cell: float, margin: int) -> tuple[NDArray[np.bool_], NDArray[np.int64]]:
+    # Cells that hold a point, with an empty margin, and the cell of the first one.
+    cells = np.floor(points / cell).astype(np.int64)
+    origin = cells.min(axis=0) - margin - 1
+    held = np.zeros(cells.max(axis=0) - origin + margin + 2, dtype=bool)
+    held[tuple((cells - origin).T)] = True
+    return held, origin
+
+
+def _met(
+    arms: Array, held: NDArray[np.bool_], origin: NDArray[np.int64], cell: float, reach: int
+) -> NDArray[np.int64]:
+    # How many points (n, 3) fall into held cells under each shift: (2 reach + 1, 2 reach + 1).
+    cells = np.floor(arms / cell).astype(np.int64) - origin
+    inside = ((cells >= reach) & (cells < np.array(held.shape) - reach)).all(axis=1)
+    i, j, k = cells[inside].T
+    steps = np.arange(-reach, reach + 1)
+    hits: NDArray[np.int64] = held[
+        (i[:, None] + steps)[:, :, None], (j[:, None] + steps)[:, None, :], k[:, None, None]
+    ].sum(axis=0)
+    return hits

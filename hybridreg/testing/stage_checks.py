@@ -1,0 +1,247 @@
+# SPDX-License-Identifier: MIT
+"""What every stage owes its pipeline, as checks."""
+
+from __future__ import annotations
+
+import copy
+import inspect
+import pickle
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hybridreg.geometry import se3
+from hybridreg.matches import Correspondences, Overlap, Pose
+from hybridreg.scene import Level, Scene
+from hybridreg.slots import SLOTS
+from hybridreg.testing.small_inputs import sample_scene, true_matches
+
+Array = NDArray[np.float64]
+Check = Callable[[Any, str], None]
+
+
+def checks() -> list[Check]:
+    """The single checks, for `pytest.mark.parametrize`."""
+    return [
+        check_parameters,
+        check_pickle_and_clone,
+        check_output,
+        check_seed,
+        check_permuted_points,
+        check_rigid_motion,
+        check_no_overlap,
+        check_no_matches,
+        check_one_match,
+    ]
+
+
+def check_stage(stage: Any, slot: str | None = None) -> None:
+    """Run every check that applies to a stage's slot.
+
+    Parameters
+    ----------
+    stage : the stage
+    slot : "downsample", "overlap", "match", "estimate" or "refine"; may be left out for a registered stage
+
+    Raises
+    ------
+    AssertionError
+        Naming the check that failed.
+    """
+    slot = slot or slot_of(stage)
+    for check in checks():
+        try:
+            check(stage, slot)
+        except AssertionError as error:
+            raise AssertionError(f"{type(stage).__name__} fails {check.__name__}: {error}") from error
+        except Exception as error:
+            message = f"{type(stage).__name__} fails {check.__name__}: raised {error!r}"
+            raise AssertionError(message) from error
+
+
+def slot_of(stage: Any) -> str:
+    """Slot of a registered stage."""
+    from hybridreg.registry import name_of
+
+    registered = name_of(stage)
+    if registered is None:
+        raise ValueError(
+            f"{type(stage).__name__} is not registered; say which slot it fills: {', '.join(SLOTS)}"
+        )
+    return registered.partition(".")[0]
+
+
+def check_parameters(stage: Any, slot: str) -> None:
+    """A mistyped keyword is refused at once."""
+    assert slot in SLOTS, f"{slot!r} is no slot; the slots are {', '.join(SLOTS)}"
+    try:
+        type(stage)(this_is_no_parameter=1)
+    except TypeError:
+        return
+    raise AssertionError("a keyword that does not exist was accepted")
+
+
+def check_pickle_and_clone(stage: Any, slot: str) -> None:
+    """Survives pickling and copying, unchanged."""
+    for other in (pickle.loads(pickle.dumps(stage)), copy.deepcopy(stage)):
+        _same(_run(stage, slot), _run(other, slot))
+    if hasattr(stage, "get_params"):
+        params = stage.get_params(deep=False)
+        clone = type(stage)(**params)
+        assert all(clone.get_params(deep=False)[k] is v for k, v in params.items()), (
+            "parameters are not kept as given"
+        )
+
+
+def check_output(stage: Any, slot: str) -> None:
+    """Returns the slot's type, with the shapes that it promises; leaves its inputs as they were."""
+    scene, _ = sample_scene()
+    before = scene.source.points.copy(), scene.target.points.copy()
+    out = _run(stage, slot, scene)
+    _valid(out, slot, scene)
+    assert np.array_equal(before[0], scene.source.points), "the source's points were changed in place"
+    assert np.array_equal(before[1], scene.target.points), "the target's points were changed in place"
+
+
+def check_seed(stage: Any, slot: str) -> None:
+    """The same generator gives the same bits, and nothing else is random."""
+    state = np.random.get_state()[1].copy()  # type: ignore[index]
+    _same(_run(stage, slot), _run(stage, slot))
+    assert np.array_equal(state, np.random.get_state()[1]), "numpy's global generator was used"  # type: ignore[index]
+
+
+def check_permuted_points(stage: Any, slot: str) -> None:
+    """The order of the points does not matter beyond the draw of random samples."""
+    scene, _ = sample_scene()
+    order = np.random.default_rng(1).permutation(len(scene.source))
+    shuffled = Level(
+        points=scene.source.points[order], spacing=scene.source.spacing, viewpoint=scene.source.viewpoint
+    )
+    other = Scene(pair=scene.pair, source=shuffled, target=scene.target)
+    one, two = _run(stage, slot, scene), _run(stage, slot, other)
+    if slot == "overlap":
+        assert np.allclose(one.source[order], two.source, atol=1e-6), (
+            "the source's overlap depends on the order"
+        )
+    if slot == "match":
+        assert abs(len(one) - len(two)) <= 0.2 * max(len(one), 20), (
+            "the number of matches depends on the order"
+        )
+    if slot in ("estimate", "refine"):
+        error = _error_m(one.T, two.T, scene)
+        assert error < 0.5 or not (one.found and two.found), (
+            f"the pose moves by {error:.2f} m with the order of points"
+        )
+
+
+def check_rigid_motion(stage: Any, slot: str) -> None:
+    """A turned source turns the pose with it; an estimator that ignores the clouds is exempt."""
+    if slot != "estimate" or not getattr(stage, "needs", frozenset()) & {"matches", "group"}:
+        return
+    scene, truth = sample_scene()
+    motion = se3.from_rt(se3.rotation_about(np.array([0.0, 0.0, 1.0])), np.array([3.0, -2.0, 0.5]))
+    matches = true_matches(scene, truth)
+    moved = Correspondences(
+        source=se3.apply(motion, matches.source),
+        target=matches.target,
+        weight=matches.weight,
+        group=matches.group,
+    )
+    level = Level(points=se3.apply(motion, scene.source.points), spacing=scene.source.spacing)
+    one = stage(scene, matches, np.random.default_rng(0))
+    two = stage(Scene(pair=scene.pair, source=level, target=scene.target), moved, np.random.default_rng(0))
+    error = _error_m(one.T, two.T @ motion, scene)
+    assert error < 0.1, f"turning the source changes the aligned cloud by {error:.2f} m"
+
+
+def check_no_overlap(stage: Any, slot: str) -> None:
+    """A matcher survives an overlap of zero everywhere."""
+    if slot == "match" and _takes_overlap(stage):
+        scene, _ = sample_scene()
+        out = stage(scene, Overlap(np.zeros(len(scene.source)), np.zeros(len(scene.target))))
+        _valid(out, slot, scene)
+
+
+def check_no_matches(stage: Any, slot: str) -> None:
+    """An estimator survives having nothing to work with, and says so."""
+    if slot == "estimate":
+        scene, _ = sample_scene()
+        out = stage(scene, Correspondences.none(), np.random.default_rng(0))
+        _valid(out, slot, scene)
+        if getattr(stage, "needs", frozenset()):
+            assert not out.found, "claims to have found a pose from no matches"
+
+
+def check_one_match(stage: Any, slot: str) -> None:
+    """One match fixes no pose; the estimator must not crash on it."""
+    if slot == "estimate":
+        scene, truth = sample_scene()
+        one = true_matches(scene, truth, n=1)
+        _valid(stage(scene, one, np.random.default_rng(0)), slot, scene, n_matches=1)
+
+
+def _run(stage: Any, slot: str, scene: Scene | None = None) -> Any:
+    made, truth = sample_scene()
+    scene = scene or made
+    if slot == "downsample":
+        return stage(scene.pair)
+    if slot == "overlap":
+        return stage(scene)
+    if slot == "match":
+        if not _takes_overlap(stage):
+            return Correspondences.none()
+        return stage(scene, Overlap.full(len(scene.source), len(scene.target)))
+    if slot == "estimate":
+        return stage(scene, true_matches(made, truth), np.random.default_rng(7))
+    return stage(scene, Pose(truth @ se3.yaw(1.0)))
+
+
+def _takes_overlap(stage: Any) -> bool:
+    # The placeholder for the caller's own matches refuses to be called; every other matcher is called.
+    from hybridreg.classical.nothing import GivenMatches
+
+    return not isinstance(stage, GivenMatches) and bool(inspect.signature(stage).parameters)
+
+
+def _valid(out: Any, slot: str, scene: Scene, n_matches: int | None = None) -> None:
+    if slot == "downsample":
+        assert isinstance(out, Scene), f"returned {type(out).__name__}, not a Scene"
+        assert out.source.points.shape[1] == 3
+        assert out.source.spacing > 0, "the spacing must be a positive length"
+    elif slot == "overlap":
+        for side, level in (("source", scene.source), ("target", scene.target)):
+            p = getattr(out, side)
+            assert p.shape == (len(level),), f"{side} has shape {p.shape}, expected ({len(level)},)"
+            assert ((p >= 0) & (p <= 1)).all(), f"{side} holds values outside [0, 1]"
+    elif slot == "match":
+        assert isinstance(out, Correspondences), f"returned {type(out).__name__}, not Correspondences"
+        assert (out.weight >= 0).all(), "weights must not be negative"
+        assert np.isfinite(out.source).all(), "a match is not finite"
+        if "group" in getattr(type(out), "gives", ()):
+            assert out.group is not None, "promises groups and gives none"
+    else:
+        assert isinstance(out, Pose), f"returned {type(out).__name__}, not a Pose"
+        se3.check(np.asarray(out.T, dtype=np.float64))
+
+
+def _same(a: Any, b: Any) -> None:
+    for x, y in zip(_arrays(a), _arrays(b), strict=True):
+        assert np.array_equal(x, y), "two equal runs differ"
+
+
+def _arrays(out: Any) -> list[Array]:
+    if isinstance(out, Scene):
+        return [out.source.points, out.target.points]
+    if isinstance(out, Overlap):
+        return [out.source, out.target]
+    if isinstance(out, Correspondences):
+        return [out.source, out.target, out.weight]
+    return [out.T]
+
+
+def _error_m(A: Array, B: Array, scene: Scene) -> float:
+    return float(
+        np.linalg.norm(se3.apply(A, scene.source.points) - se3.apply(B, scene.source.points), axis=1).mean()
+    )

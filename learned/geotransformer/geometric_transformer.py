@@ -1,0 +1,46 @@
+# SPDX-License-Identifier: MIT
+"""The GeoTransformer block: geometric self-attention and cross-attention in turns (methods 6.6)."""
+
+from __future__ import annotations
+
+from torch import Tensor, nn
+
+from hybridreg.learned.cross3dreg.config import TransformerConfig
+from hybridreg.learned.geotransformer.structure_embedding import StructureEmbedding
+from hybridreg.learned.layers.attention import AttentionLayer
+
+
+class GeoTransformerBlock(nn.Module):
+    """Exchange features within and between the clouds; vanilla self-attention looks at no geometry."""
+
+    def __init__(self, config: TransformerConfig) -> None:
+        super().__init__()
+        self.kinds = config.blocks
+        geometric = config.self_attention == "geometric"
+        dim = config.hidden_dim
+        self.embedding = (
+            StructureEmbedding(dim, config.sigma_d, config.sigma_a, config.angle_k) if geometric else None
+        )
+        self.layers = nn.ModuleList(
+            AttentionLayer(dim, config.heads, geometric=geometric and kind == "self")
+            for kind in config.blocks
+        )
+        self.out = nn.Linear(dim, config.output_dim)
+
+    def forward(
+        self, target: Tensor, source: Tensor, target_points: Tensor, source_points: Tensor
+    ) -> tuple[Tensor, Tensor]:
+        """Features (m, d), (n, d) at positions (m, 3), (n, 3) to (m, out), (n, out)."""
+        # One embedding a cloud serves all self layers: it is the largest tensor of the network.
+        structures: tuple[Tensor | None, Tensor | None] = (None, None)
+        if self.embedding is not None:
+            structures = (self.embedding(target_points), self.embedding(source_points))
+        for kind, layer in zip(self.kinds, self.layers, strict=True):
+            if kind == "self":
+                target = layer(target, target, structures[0])
+                source = layer(source, source, structures[1])
+            else:
+                # In this order: the source sees the target that has already seen the source.
+                target = layer(target, source)
+                source = layer(source, target)
+        return self.out(target), self.out(source)

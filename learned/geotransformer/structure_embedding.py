@@ -1,0 +1,71 @@
+# SPDX-License-Identifier: MIT
+"""GeoTransformer's geometric structure embedding: distances and angles between superpoints (methods 6.6)."""
+
+from __future__ import annotations
+
+import math
+from functools import reduce
+
+import torch
+from torch import Tensor, nn
+
+from hybridreg.learned.layers.curve_table import interpolate, sample_positions
+from hybridreg.learned.layers.distances import squared_distances
+from hybridreg.learned.layers.positions import frequencies, sinusoids
+
+# Values of the (rows, n, k, d) angle tensor computed in one go: 16 MB, whatever the number of superpoints.
+_CHUNK_VALUES = 2**22
+
+
+class StructureEmbedding(nn.Module):
+    """One vector for each ordered pair of superpoints, unchanged by rigid motion.
+
+    ``sigma_d`` in metres and ``sigma_a`` in degrees scale distance and angle; ``angle_k`` nearest superpoints
+    span the angles.
+    """
+
+    frequency: Tensor
+
+    def __init__(self, dim: int, sigma_d: float, sigma_a: float, angle_k: int) -> None:
+        super().__init__()
+        self.sigma_d, self.angle_k = sigma_d, angle_k
+        self.angle_scale = 180.0 / (sigma_a * math.pi)
+        self.register_buffer("frequency", frequencies(dim))
+        self.distance, self.angle = nn.Linear(dim, dim), nn.Linear(dim, dim)
+
+    def forward(self, points: Tensor) -> Tensor:
+        """(n, 3) metres to (n, n, d)."""
+        distance = squared_distances(points, points).sqrt()  # (n, n)
+        k = min(self.angle_k, len(points) - 1)
+        nearest = distance.topk(k + 1, largest=False)[1][:, 1:]  # (n, k)
+        distance = distance / self.sigma_d
+        curves = (
+            self._curve(self.distance, float(distance.max())),
+            self._curve(self.angle, math.pi * self.angle_scale),
+        )
+        rows = max(1, _CHUNK_VALUES // (len(points) * max(k, 1) * self.distance.in_features))
+        blocks = torch.arange(len(points), device=points.device).split(rows)
+        return torch.cat([self._rows(points, distance[b], nearest[b], b, curves) for b in blocks])
+
+    def _rows(
+        self, points: Tensor, distance: Tensor, nearest: Tensor, block: Tensor, curves: tuple[Tensor, Tensor]
+    ) -> Tensor:
+        embedding = interpolate(curves[0], distance)  # (b, n, d)
+        if nearest.shape[1] == 0:  # a single superpoint spans no angle
+            return embedding
+        angles = neighbor_angles(points[block], points, points[nearest]) * self.angle_scale  # (b, n, k)
+        # One by one: the gradient of a largest value over a dimension makes four passes more.
+        return embedding.add_(reduce(torch.maximum, interpolate(curves[1], angles).unbind(2)))
+
+    def _curve(self, layer: nn.Linear, highest: float) -> Tensor:
+        """Samples of the embedding of a number: n^2 (k + 1) sines and products would say no more."""
+        return layer(sinusoids(sample_positions(highest, self.frequency), self.frequency))
+
+
+def neighbor_angles(anchors: Tensor, points: Tensor, nearest: Tensor) -> Tensor:
+    """Angles (b, n, k) in radians at anchors (b, 3), between points (n, 3) and neighbours (b, k, 3)."""
+    to_point = (points[None] - anchors[:, None])[:, :, None]  # (b, n, 1, 3)
+    to_near = (nearest - anchors[:, None])[:, None]  # (b, 1, k, 3)
+    to_point, to_near = torch.broadcast_tensors(to_point, to_near)
+    sine = torch.linalg.cross(to_near, to_point, dim=-1).norm(dim=-1)
+    return torch.atan2(sine, (to_near * to_point).sum(-1))

@@ -1,0 +1,2 @@
+# SPDX-License-Identifier: MIT
+"""Losses that several networks use."""
