@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.alternate import race, real_pairs
-from hybridreg.classical.voxel import voxel_centroids
+from hybridreg.geometry.voxel_cells import voxel_centroids
 from hybridreg.resolution import default_voxel
 from hybridreg.runtime.open3d import load_open3d
 

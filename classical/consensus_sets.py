@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybridreg.classical.compatibility import Floats, Rows, leading_eigenvectors
-from hybridreg.classical.svd import kabsch_batch
+from hybridreg.geometry.kabsch import kabsch_batch
 
 Array = NDArray[np.float64]
 

@@ -5,21 +5,19 @@ from __future__ import annotations
 
 import zlib
 from dataclasses import dataclass
-from typing import ClassVar, Literal
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from hybridreg import normals as surface
 from hybridreg.geometry.nearest_descriptors import nearest
 from hybridreg.matches import Correspondences, Overlap
 from hybridreg.runtime.open3d import load_open3d
-from hybridreg.scene import Level, Scene
+from hybridreg.scene import Scene, Side
 from hybridreg.stage import Stage
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
-Side = Literal["source", "target"]
 
 # In spacings. Five is usual; sparse scans want more to tell one neighbourhood from another.
 _RADIUS = 8.0
@@ -99,9 +97,9 @@ class Fpfh(Stage):
 
     def features(self, scene: Scene, side: Side) -> Array:
         """Descriptors (n, 33) of a level's points: roots of histograms, zero where there is no neighbour."""
-        level: Level = getattr(scene, side)
+        level = scene.level(side)
         radius = self.radius or _RADIUS * scene.spacing
-        normals = surface.of(scene, side, self.normal_neighbours)
+        normals = level.normals(self.normal_neighbours)
         key = ("fpfh", side, radius, self.max_neighbours, self.normal_neighbours)
         return scene.shared(key, lambda: _fpfh(level.points, normals, radius, self.max_neighbours))
 

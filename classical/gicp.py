@@ -9,12 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hybridreg.classical.voxel import voxel_centroids
 from hybridreg.config import limits
 from hybridreg.geometry import se3
 from hybridreg.geometry.fitness import measure
 from hybridreg.matches import Pose
-from hybridreg.normals import tree
 from hybridreg.runtime.cores import n_threads
 from hybridreg.runtime.optional_packages import load
 from hybridreg.scene import Scene
@@ -71,7 +69,7 @@ class Gicp(Stage):
         source, _ = _surfaces(near, self.neighbours)
         target, target_tree = scene.shared(
             ("small_gicp", voxel, self.neighbours),
-            lambda: _surfaces(voxel_centroids(scene.pair.target.points, voxel), self.neighbours),
+            lambda: _surfaces(scene.at(voxel).target.points, self.neighbours),
         )
         rests = False
         for distance in distances:
@@ -107,7 +105,7 @@ def not_worse(scene: Scene, before: Pose, T: Array) -> Pose:
     if not np.isfinite(T).all():
         return before
     on = [
-        measure(scene.source.points, tree(scene, "target"), M, 1.25 * scene.spacing).fitness
+        measure(scene.source.points, scene.target.tree, M, 1.25 * scene.spacing).fitness
         for M in (before.T, T)
     ]
     return replace(before, T=T) if on[1] >= _KEPT * on[0] else before
@@ -117,10 +115,8 @@ def _within(scene: Scene, T: Array, voxel: float, reach: float) -> Array:
     # The source's points (n, 3), less those that are no partners. small_gicp looks for the nearest point however far it
     # is, and the farther it is the longer it takes: a third of the time for a right pose, half a minute for one that
     # lays most points beside the target.
-    points: Array = scene.shared(
-        ("gicp source", voxel), lambda: voxel_centroids(scene.pair.source.points, voxel)
-    )
-    distance, _ = tree(scene, "target").query(
+    points = scene.at(voxel).source.points
+    distance, _ = scene.target.tree.query(
         se3.apply(T, points), distance_upper_bound=reach, workers=n_threads()
     )
     return points[np.isfinite(distance)]

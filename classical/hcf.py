@@ -13,10 +13,10 @@ from threadpoolctl import threadpool_limits
 from hybridreg.classical.compatibility import first_order, leading_eigenvectors, pick_seeds, second_order
 from hybridreg.classical.consensus_sets import filter_sets, first_sets, set_poses, set_weights
 from hybridreg.classical.pose_modes import modes, same
-from hybridreg.classical.svd import kabsch
 from hybridreg.config import limits
 from hybridreg.geometry import se3
 from hybridreg.geometry.consensus import Consensus
+from hybridreg.geometry.kabsch import kabsch
 from hybridreg.matches import Correspondences, Pose
 from hybridreg.scene import Scene
 from hybridreg.stage import Stage

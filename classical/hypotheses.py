@@ -8,7 +8,7 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from hybridreg.classical.svd import STATUSES, kabsch_batch
+from hybridreg.geometry.kabsch import STATUSES, kabsch_batch
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]

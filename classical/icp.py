@@ -9,7 +9,6 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from hybridreg import normals as surface
 from hybridreg.config import limits
 from hybridreg.geometry import se3
 from hybridreg.matches import Pose
@@ -61,7 +60,7 @@ class Icp(Stage):
 
     def _step(self, scene: Scene, T: Array, max_distance: float) -> Array | None:
         moved = se3.apply(T, scene.source.points)
-        distance, index = surface.tree(scene, "target").query(
+        distance, index = scene.target.tree.query(
             moved, distance_upper_bound=max_distance, workers=n_threads()
         )
         hit = np.isfinite(distance)
@@ -69,7 +68,7 @@ class Icp(Stage):
             return None
         p, q = moved[hit], scene.target.points[index[hit]]
         if self.kind == "plane":
-            return plane_step(p, q, surface.of(scene, "target")[index[hit]])
+            return plane_step(p, q, scene.target.normals()[index[hit]])
         return point_step(p, q)
 
 

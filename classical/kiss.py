@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from hybridreg.classical.voxel import voxel_centroids
 from hybridreg.config import limits
+from hybridreg.geometry.voxel_cells import voxel_centroids
 from hybridreg.matches import Correspondences, Pose
 from hybridreg.runtime import optional_packages as wheels
 from hybridreg.runtime.cores import n_threads

@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 
 from hybridreg.classical import hypotheses
 from hybridreg.classical.pose_modes import modes
-from hybridreg.classical.svd import kabsch
 from hybridreg.geometry import se3
 from hybridreg.geometry.consensus import Consensus
+from hybridreg.geometry.kabsch import kabsch
 from hybridreg.matches import Correspondences, Pose
 from hybridreg.runtime.threads import single
 from hybridreg.scene import Scene

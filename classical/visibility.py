@@ -4,20 +4,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from hybridreg.geometry import ground
 from hybridreg.geometry.extent import radii, reach
 from hybridreg.geometry.range_image import RangeImage, RangeImages
 from hybridreg.matches import Overlap
-from hybridreg.scene import Level, Scene
+from hybridreg.scene import Scene, Side
 from hybridreg.stage import Stage
 
 Array = NDArray[np.float64]
-Side = Literal["source", "target"]
 
 # Share of a sensor's returns beyond its range or outside its vertical field of view, as here taken: strays.
 _STRAYS = 0.01
@@ -62,13 +59,13 @@ class Visibility(Stage):
 
 def _reached(scene: Scene, side: Side, baseline: float) -> Array:
     other: Side = "target" if side == "source" else "source"
-    level: Level = getattr(scene, side)
+    level = scene.level(side)
     image: RangeImage | RangeImages | None = getattr(scene.pair, other).range_image
     # Sensors at several places together see nearly everything about them.
     if not isinstance(image, RangeImage) or level.viewpoint is None or level.viewpoint.ndim > 1:
         return np.ones(len(level))
     farthest = float(np.quantile(image.ranges, 1.0 - _STRAYS))
-    here, there = ground.find(scene, side), ground.find(scene, other)
+    here, there = scene.level(side).ground, scene.level(other).ground
     if here is None or there is None:
         return _within_range(level.points - level.viewpoint, farthest, baseline)
     up = here.above(level.points) - float(there.above(image.viewpoint[None])[0])

@@ -10,12 +10,12 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from hybridreg.classical.thinning import thinned
 from hybridreg.geometry.voxel_cells import voxel_centroids
 from hybridreg.pair import Pair
 from hybridreg.resolution import comparable, default_voxel
 from hybridreg.scene import Level, Scene
 from hybridreg.stage import Stage
+from hybridreg.thinning import thinned
 
 Array = NDArray[np.float64]
 
@@ -34,7 +34,7 @@ class VoxelGrid(Stage):
         Edge of a cell, metres. None derives one length for both clouds from how far they reach
         (`hybridreg.resolution.default_voxel`), a longer one where a cloud would keep more than 30,000 points of its
         own otherwise, and notes it in the result. A cloud of more than a million and a half points is first thinned to
-        cells of a quarter of that (`hybridreg.classical.thinning`).
+        cells of a quarter of that (`hybridreg.thinning`).
     density : "keep" or "match"
         "match" gives each cloud the voxel at which both have about as many points per occupied volume; for a
         sparse sensor against a dense one.

@@ -5,21 +5,28 @@ from __future__ import annotations
 
 from collections.abc import Callable, Hashable
 from dataclasses import dataclass, field
-from typing import Any, TypeVar
+from functools import cached_property
+from typing import Any, Literal, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
+from hybridreg.geometry import ground, normals
+from hybridreg.geometry.ground import Ground
+from hybridreg.geometry.voxel_cells import voxel_centroids
 from hybridreg.matches import Correspondences
 from hybridreg.pair import Pair
+from hybridreg.thinning import thinned
 
 Array = NDArray[np.float64]
+Side = Literal["source", "target"]
 Value = TypeVar("Value")
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Level:
-    """One downsampled cloud.
+    """One downsampled cloud, and what is found out about it once a run.
 
     Attributes
     ----------
@@ -34,17 +41,38 @@ class Level:
     points: Array
     spacing: float
     viewpoint: Array | None = None
+    _normals: dict[int, Array] = field(default_factory=dict, repr=False)
 
     def __len__(self) -> int:
         return len(self.points)
 
+    def __getstate__(self) -> dict[str, Any]:
+        # What is found out again in no time need not travel between processes.
+        return {name: self.__dict__[name] for name in ("points", "spacing", "viewpoint")} | {"_normals": {}}
 
-def centre(level: Level) -> Array:
-    """Where the cloud was seen from, (3,): the middle of several places; of the points where none is known."""
-    if level.viewpoint is None:
-        middle: Array = np.median(level.points, axis=0)
-        return middle
-    return level.viewpoint if level.viewpoint.ndim == 1 else level.viewpoint.mean(axis=0)
+    @cached_property
+    def tree(self) -> cKDTree:
+        """KD-tree of the points."""
+        return cKDTree(self.points)
+
+    @cached_property
+    def ground(self) -> Ground | None:
+        """The ground that the cloud shows; None where no plane carries enough of its points."""
+        return ground.under(self.points, self.viewpoint, self.spacing)
+
+    @cached_property
+    def centre(self) -> Array:
+        """Where the cloud was seen from, (3,): the middle of several places; of the points where none is known."""
+        if self.viewpoint is None:
+            middle: Array = np.median(self.points, axis=0)
+            return middle
+        return self.viewpoint if self.viewpoint.ndim == 1 else self.viewpoint.mean(axis=0)
+
+    def normals(self, k: int = 20) -> Array:
+        """Normals (n, 3) from each point's k nearest neighbours, towards the sensor."""
+        if k not in self._normals:
+            self._normals[k] = normals.estimate(self.points, self.viewpoint, k)
+        return self._normals[k]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -70,6 +98,27 @@ class Scene:
     explanations: list[str] = field(default_factory=list)
     matches: list[Correspondences] = field(default_factory=list)
     _shared: dict[Hashable, Any] = field(default_factory=dict, repr=False)
+    _grids: dict[float, Scene] = field(default_factory=dict, repr=False)
+
+    @classmethod
+    def on_cells(cls, pair: Pair, voxel: float) -> Scene:
+        """Both clouds as the centroids of a grid's cells of one edge, metres."""
+        clouds = thinned(pair, voxel)
+        source, target = (
+            Level(points=voxel_centroids(cloud.points, voxel), spacing=voxel, viewpoint=cloud.viewpoint)
+            for cloud in (clouds.source, clouds.target)
+        )
+        return cls(pair=clouds, source=source, target=target)
+
+    def at(self, voxel: float) -> Scene:
+        """The same pair on a grid of another edge, made once a run."""
+        if voxel not in self._grids:
+            self._grids[voxel] = Scene.on_cells(self.pair, voxel)
+        return self._grids[voxel]
+
+    def level(self, side: Side) -> Level:
+        """The source's level or the target's."""
+        return self.source if side == "source" else self.target
 
     @property
     def spacing(self) -> float:

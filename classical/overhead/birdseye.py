@@ -13,17 +13,16 @@ from numpy.typing import NDArray
 from hybridreg.classical.overhead.overhead_columns import FromAbove, from_above
 from hybridreg.classical.overhead.planar_climb import climb
 from hybridreg.classical.overhead.sweep import sweep
-from hybridreg.geometry import ground, se3
+from hybridreg.evidence.support import NEARLY
+from hybridreg.geometry import se3
 from hybridreg.geometry.ground import Ground
 from hybridreg.matches import Correspondences, Pose
 from hybridreg.resolution import map_cell
-from hybridreg.scene import Level, Scene, centre
+from hybridreg.scene import Level, Scene, Side
 from hybridreg.search.rivals import BEYOND_DOUBT, Rival, best_first, distinct, highest
 from hybridreg.stage import Stage
-from hybridreg.verdict.confidence import NEARLY
 
 Array = NDArray[np.float64]
-Side = Literal["source", "target"]
 
 # In voxels: the coarse map's cell, how far from the sensor points are used. Two such clouds fit in the largest map.
 _COARSE, _REACH = 3.0, 175.0
@@ -93,7 +92,7 @@ class BirdsEye(Stage):
 
     def __call__(self, scene: Scene, matches: Correspondences, rng: np.random.Generator) -> Pose:
         voxel = self.voxel or map_cell(scene.pair.source, scene.pair.target)
-        own = ground.on_grid(scene, voxel)
+        own = scene.at(voxel)
         frames = _by_ground(own, scene) if self.vertical == "ground" else _by_sensor(own)
         found = self._laid(scene, own, frames, voxel)
         if not found:
@@ -123,15 +122,15 @@ class BirdsEye(Stage):
         if not found or not self.again:
             return found
         # Levelled by the best pose, both clouds lie truer than by their grounds.
-        T_level_source = _centred(T_level_target @ found[0].T, centre(own.source))
+        T_level_source = _centred(T_level_target @ found[0].T, own.source.centre)
         again = self._slid(self._view(own, "source", T_level_source, voxel), target, voxel)
         return found + best_first(scene, [T_target_level @ M @ T_level_source for M in again])
 
     def _view(self, own: Scene, side: Side, T_level_cloud: Array, voxel: float) -> FromAbove:
-        level = getattr(own, side)
+        level = own.level(side)
         points = se3.apply(T_level_cloud, level.points)
-        one_place = level.viewpoint is not None and level.viewpoint.ndim == 1
-        eye = se3.apply(T_level_cloud, level.viewpoint[None])[0] if one_place else None
+        place = level.viewpoint if level.viewpoint is not None and level.viewpoint.ndim == 1 else None
+        eye = None if place is None else se3.apply(T_level_cloud, place[None])[0]
         near = np.hypot(*points[:, :2].T) < _REACH * voxel
         return from_above(points[near], eye, tuple(voxel * edge for edge in self.layers), voxel)
 
@@ -183,11 +182,11 @@ def _centred(T_level_cloud: Array, place: Array) -> Array:
 
 def _by_ground(own: Scene, scene: Scene) -> list[Array]:
     # What levels each cloud by the ground it shows, or by what may be the ground instead.
-    found = {side: ground.find(own, side) for side in _SIDES}
+    found = {side: own.level(side).ground for side in _SIDES}
     frames = []
     for side, other in zip(_SIDES, reversed(_SIDES), strict=True):
         shown, known = found[side], found[other]
-        level = getattr(own, side)
+        level = own.level(side)
         if shown is None:
             head_down = known is not None and known.up[2] < np.cos(np.radians(_UPTURNED_DEG))
             shown = _assumed(level.points, -1.0 if head_down else 1.0)
@@ -209,4 +208,4 @@ def _assumed(points: Array, sign: float) -> Ground:
 
 
 def _level_frame(g: Ground, level: Level) -> Array:
-    return _centred(se3.from_rt(g.levelling, np.array([0.0, 0.0, -g.height])), centre(level))
+    return _centred(se3.from_rt(g.levelling, np.array([0.0, 0.0, -g.height])), level.centre)

@@ -9,12 +9,11 @@ from numpy.typing import NDArray
 from hybridreg.classical.overhead.overhead_columns import FromAbove
 from hybridreg.classical.overhead.signed_map import blurred, signed
 from hybridreg.classical.overhead.sweep import Planar
+from hybridreg.geometry.stencil import NEIGHBOURS
 
 Array = NDArray[np.float64]
 Floats = NDArray[np.float32]
 
-# Neighbours of a motion along the ground, itself among them, in steps of its three numbers.
-NEIGHBOURS = np.stack(np.meshgrid(*[[-1.0, 0.0, 1.0]] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
 # Moves; the step is halved after each.
 _MOVES = 3
 # Columns that vote.

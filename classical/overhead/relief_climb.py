@@ -6,9 +6,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from hybridreg.classical.overhead.planar_climb import NEIGHBOURS
 from hybridreg.geometry import se3
 from hybridreg.geometry.ground_relief import Relief, looked_up, nats
+from hybridreg.geometry.stencil import NEIGHBOURS
 
 Array = NDArray[np.float64]
 

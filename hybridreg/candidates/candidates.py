@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 
 from hybridreg import fitting, spec
 from hybridreg.candidates import input_mistakes
-from hybridreg.classical.nothing import NoOverlap
 from hybridreg.evidence import match_agreement, support
+from hybridreg.evidence.support import NEARLY, OK
 from hybridreg.io.shipped_weights import MissingWeights
-from hybridreg.matches import Correspondences, Pose
+from hybridreg.matches import Correspondences, Overlap, Pose
 from hybridreg.resolution import comparable, size_ratio
 from hybridreg.scene import Scene
 from hybridreg.search import rivals
@@ -24,7 +24,6 @@ from hybridreg.search.pattern_search import climb
 from hybridreg.search.rivals import Rival
 from hybridreg.stage import Stage
 from hybridreg.verdict import weigh
-from hybridreg.verdict.confidence import NEARLY, OK
 
 Array = NDArray[np.float64]
 Entry = Mapping[str, Any]
@@ -188,13 +187,20 @@ def _pose(entry: Entry, scene: Scene, matches: Correspondences, rng: np.random.G
         for stage in entry.values():
             fitting.check_stage_image(stage, scene.pair)
         if "match" in entry:
-            matches = scene.matched(entry["match"](scene, entry.get("overlap", NoOverlap())(scene)))
+            matches = scene.matched(entry["match"](scene, _overlap(entry, scene)))
         return entry["estimate"](scene, matches, rng)
     except MissingWeights:
         raise
     except (ValueError, OSError) as error:
         _left_out(entry, scene, error)
         return Pose.unknown()
+
+
+def _overlap(entry: Entry, scene: Scene) -> Overlap:
+    if "overlap" not in entry:
+        return Overlap.full(len(scene.source), len(scene.target))
+    found: Overlap = entry["overlap"](scene)
+    return found
 
 
 def _left_out(entry: Entry, scene: Scene, error: Exception) -> str:

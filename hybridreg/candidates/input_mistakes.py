@@ -9,16 +9,15 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from hybridreg.classical.overhead.birdseye import BirdsEye
-from hybridreg.classical.voxel import VoxelGrid
+from hybridreg import spec
 from hybridreg.cloud import PointCloud
+from hybridreg.evidence.support import OK
 from hybridreg.matches import Correspondences
 from hybridreg.pair import Pair
 from hybridreg.resolution import comparable, size_ratio
 from hybridreg.scene import Scene
 from hybridreg.search.rivals import HOPELESS, seen_at
 from hybridreg.verdict import weigh
-from hybridreg.verdict.confidence import OK
 
 Array = NDArray[np.float64]
 
@@ -72,8 +71,9 @@ def _changed(cloud: PointCloud, factors: Array) -> PointCloud:
 
 
 def _fit(pair: Pair) -> float:
-    scene = VoxelGrid()(pair)
-    pose = BirdsEye(tries=_TRIES, again=False)(scene, Correspondences.none(), np.random.default_rng(0))
+    scene = spec.from_table("voxel", "downsample")(pair)
+    search = spec.from_table({"stage": "birdseye", "tries": _TRIES, "again": False}, "estimate")
+    pose = search(scene, Correspondences.none(), np.random.default_rng(0))
     if not pose.found or seen_at(scene, [pose.T], 1)[0].support < HOPELESS:
         return 0.0
     return weigh(scene, pose).confidence

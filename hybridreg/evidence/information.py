@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from hybridreg.evidence.agreement import Agreement
 from hybridreg.evidence.views import View
+from hybridreg.geometry.point_to_plane import jacobian
 
 Array = NDArray[np.float64]
 
@@ -76,9 +77,3 @@ def measure(agreement: Agreement, target: View) -> Information:
         turns=turns,
         direction=direction / np.linalg.norm(direction),
     )
-
-
-def jacobian(arms: Array, normals: Array) -> Array:
-    """Derivatives (..., 6) of point-to-plane distances by a small rotation and a translation; `arms` (..., 3) from the
-    centre."""
-    return np.concatenate([np.cross(arms, normals), normals], axis=-1)

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from hybridreg.evidence import views
 from hybridreg.evidence.surface_distance import closeness, fine_surfaces
+from hybridreg.geometry.point_to_plane import descend
 from hybridreg.scene import Scene
-from hybridreg.search.settle import descend
 
 Array = NDArray[np.float64]
 

@@ -22,6 +22,10 @@ from hybridreg.scene import Scene
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
+# Probability from which a pose is "ok". A rival explains the data nearly as well when its support is less than the
+# log-odds of that below the pose's.
+OK = 0.95
+NEARLY = float(np.log(OK / (1.0 - OK)))
 # Below this no direction is held, and how little it is held says no more.
 _UNHELD = 1e-4
 # A share below this is as good as none.

@@ -18,9 +18,9 @@ from scipy.spatial import cKDTree
 from hybridreg.cloud import PointCloud
 from hybridreg.geometry import se3
 from hybridreg.geometry.extent import bounds, reach
+from hybridreg.geometry.point_to_plane import descend
 from hybridreg.runtime.cores import n_threads
 from hybridreg.scene import Scene
-from hybridreg.search.settle import descend
 
 Array = NDArray[np.float64]
 
@@ -127,7 +127,7 @@ def fine_surfaces(scene: Scene) -> tuple[Surfaces, Surfaces]:
 
 
 def _surfaces(cloud: PointCloud, scale: float) -> Surfaces:
-    from hybridreg.classical.voxel import voxel_centroids
+    from hybridreg.geometry.voxel_cells import voxel_centroids
 
     rng = np.random.default_rng(0)
     points = cloud.points

@@ -5,24 +5,21 @@ from __future__ import annotations
 
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from hybridreg import normals
-from hybridreg.geometry import ground
+from hybridreg.geometry import ground, normals
 from hybridreg.geometry.ground import Ground
 from hybridreg.geometry.ground_relief import Relief
 from hybridreg.geometry.main_axes import balanced
 from hybridreg.geometry.range_image import RangeImage, RangeImages
 from hybridreg.resolution import default_voxel, map_cell
 from hybridreg.runtime.cores import n_threads
-from hybridreg.scene import Level, Scene, centre
+from hybridreg.scene import Scene, Side
 
 Array = NDArray[np.float64]
-Side = Literal["source", "target"]
 
 # The evidence must mean the same whatever voxel the pipeline used, so it has its own; a level that comes near
 # enough is used as it is, with the normals and the tree that other stages already computed.
@@ -84,7 +81,7 @@ def spacing(scene: Scene) -> float:
 
 def _both(scene: Scene) -> tuple[View, View]:
     wanted = spacing(scene)
-    on_grid = ground.on_grid(scene, map_cell(scene.pair.source, scene.pair.target))
+    on_grid = scene.at(map_cell(scene.pair.source, scene.pair.target))
     # Side by side: most of it is sorting and trees, which each take one thread.
     with ThreadPoolExecutor(min(2, n_threads())) as pool:
         source = pool.submit(_view, scene, "source", wanted, on_grid)
@@ -93,11 +90,11 @@ def _both(scene: Scene) -> tuple[View, View]:
 
 
 def _view(scene: Scene, side: Side, wanted: float, on_grid: Scene) -> View:
-    level: Level = getattr(scene, side)
+    level = scene.level(side)
     if len(level) <= _MOST_POINTS and 1 / _NEAR_ENOUGH < level.spacing / wanted < _NEAR_ENOUGH:
-        points, tree, surface = level.points, normals.tree(scene, side), normals.of(scene, side)
+        points, tree, surface = level.points, level.tree, level.normals()
     else:
-        from hybridreg.classical.voxel import voxel_centroids
+        from hybridreg.geometry.voxel_cells import voxel_centroids
 
         points = voxel_centroids(getattr(scene.pair, side).points, wanted)
         tree, surface = cKDTree(points), normals.estimate(points, level.viewpoint)
@@ -112,13 +109,13 @@ def _view(scene: Scene, side: Side, wanted: float, on_grid: Scene) -> View:
         relief=_relief(scene, side, on_grid),
         ground=_upright_ground(on_grid, side) if scene.pair.gravity == "known" else None,
         thickness=ground.thickness(points, wanted),
-        centre=centre(level),
+        centre=level.centre,
     )
 
 
 def _upright_ground(on_grid: Scene, side: Side) -> Ground | None:
     # Its upper side is that of the sensor; where nobody said where that stood, of what stands on it too.
-    found, level = ground.find(on_grid, side), getattr(on_grid, side)
+    found, level = on_grid.level(side).ground, on_grid.level(side)
     if found is None or level.viewpoint is None or getattr(on_grid.pair, side).said is not None:
         return found
     by_content = ground.under(level.points, None, level.spacing)
@@ -126,7 +123,7 @@ def _upright_ground(on_grid: Scene, side: Side) -> Ground | None:
 
 
 def _relief(scene: Scene, side: Side, on_grid: Scene) -> Relief | None:
-    found, level = ground.find(on_grid, side), getattr(on_grid, side)
+    found, level = on_grid.level(side).ground, on_grid.level(side)
     if found is None:
         return None
-    return Relief.of(getattr(scene.pair, side).points, centre(level), found, level.spacing)
+    return Relief.of(getattr(scene.pair, side).points, level.centre, found, level.spacing)

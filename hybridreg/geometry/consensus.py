@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from hybridreg.classical.svd import kabsch
 from hybridreg.geometry import se3
+from hybridreg.geometry.kabsch import kabsch
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]

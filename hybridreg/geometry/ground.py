@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +12,7 @@ from hybridreg.geometry import se3
 from hybridreg.geometry.extent import radii, reach
 
 if TYPE_CHECKING:
-    from hybridreg.scene import Level, Scene
+    pass
 
 Array = NDArray[np.float64]
 Weights = NDArray[np.float64]
@@ -51,23 +51,6 @@ class Ground(NamedTuple):
         sine, cosine = float(np.linalg.norm(axis)), float(self.up @ z)
         direction = axis / sine if sine > 1e-9 else np.array([1.0, 0.0, 0.0])
         return se3.rotation_about(np.arctan2(sine, cosine) * direction)
-
-
-def on_grid(scene: Scene, voxel: float) -> Scene:
-    """The pair of a scene on the grid on which it is seen from above, made once a run."""
-    from hybridreg.classical.voxel import VoxelGrid
-
-    return scene.shared(("seen from above", voxel), lambda: VoxelGrid(voxel=voxel)(scene.pair))
-
-
-def find(scene: Scene, side: Literal["source", "target"]) -> Ground | None:
-    """Ground of one level, or None where no plane carries enough of the points; see `under`."""
-
-    def look() -> Ground | None:
-        level: Level = getattr(scene, side)
-        return under(level.points, level.viewpoint, level.spacing)
-
-    return scene.shared(("ground", side), look)
 
 
 def under(points: Array, viewpoint: Array | None, spacing: float) -> Ground | None:

@@ -10,10 +10,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from hybridreg.classical.overhead.planar_climb import NEIGHBOURS
 from hybridreg.evidence import support, views
 from hybridreg.geometry import se3
 from hybridreg.geometry.main_axes import main_axes
+from hybridreg.geometry.stencil import NEIGHBOURS
 from hybridreg.scene import Scene
 from hybridreg.search.rivals import Rival
 

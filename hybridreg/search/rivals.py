@@ -14,6 +14,7 @@ from hybridreg.evidence import match_agreement as matched
 from hybridreg.evidence import support, views
 from hybridreg.evidence.agreement import Agreement
 from hybridreg.evidence.information import Information
+from hybridreg.evidence.support import NEARLY
 from hybridreg.evidence.surface_distance import closeness, settle_closely
 from hybridreg.evidence.views import View
 from hybridreg.geometry import se3
@@ -21,7 +22,6 @@ from hybridreg.matches import Pose
 from hybridreg.scene import Scene
 from hybridreg.search.repeats import copies
 from hybridreg.search.settle import settle
-from hybridreg.verdict.confidence import NEARLY
 
 Array = NDArray[np.float64]
 

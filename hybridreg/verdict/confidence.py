@@ -16,13 +16,12 @@ from typing import Literal
 
 import numpy as np
 
+from hybridreg.evidence.support import NEARLY, OK
 from hybridreg.verdict.boosted import Boosted
 
 Word = Literal["ok", "doubtful", "failed"]
 
-OK, FAILED = 0.95, 0.5
-# A rival explains the data nearly as well when its support is less than the log-odds of "ok" below the pose's.
-NEARLY = float(np.log(OK / (1.0 - OK)))
+FAILED = 0.5
 # The rival margin where there is no rival to compare with, and the farthest that one counts.
 NO_RIVAL = -20.0
 # No more is believed of a pose that turns the world over, nor of one at which the source fits better by so many nats

@@ -12,6 +12,7 @@ from hybridreg.evidence import match_agreement, support, views
 from hybridreg.evidence.agreement import Agreement, OneWay
 from hybridreg.evidence.information import Information
 from hybridreg.evidence.scale import Size, size
+from hybridreg.evidence.support import NEARLY
 from hybridreg.evidence.surface_distance import closeness
 from hybridreg.evidence.views import View
 from hybridreg.geometry.fitness import Overlay
@@ -19,7 +20,7 @@ from hybridreg.matches import Correspondences, Pose
 from hybridreg.scene import Scene
 from hybridreg.search import rivals
 from hybridreg.search.rivals import Rival
-from hybridreg.verdict.confidence import DOUBTED, NEARLY, NO_RIVAL, Word, confidence, word
+from hybridreg.verdict.confidence import DOUBTED, NO_RIVAL, Word, confidence, word
 from hybridreg.verdict.words import reasons
 
 Array = NDArray[np.float64]

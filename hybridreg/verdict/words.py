@@ -9,7 +9,8 @@ import numpy as np
 
 from hybridreg.evidence.agreement import Agreement
 from hybridreg.evidence.information import Information
-from hybridreg.verdict.confidence import NEARLY, SIZE_GAIN
+from hybridreg.evidence.support import NEARLY
+from hybridreg.verdict.confidence import SIZE_GAIN
 
 # Where a number becomes worth a sentence. In simulated scenes nine in ten right poses stayed on the good side.
 LOOKED_THROUGH, AGREEMENT, WEAK, OVERLAP, FEW = 0.12, 0.3, 0.02, 0.15, 60

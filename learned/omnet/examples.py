@@ -13,7 +13,6 @@ from hybridreg.learned.omnet.batch import OmnetBatch, make_batch
 from hybridreg.learned.omnet.config import OmnetConfig
 from hybridreg.learned.omnet.targets import OmnetTargets, compute_targets
 from hybridreg.learned.true_pair import TruePair
-from hybridreg.scene import centre
 
 
 def example(pair: TruePair, config: OmnetConfig, rng: np.random.Generator) -> tuple[OmnetBatch, OmnetTargets]:
@@ -24,7 +23,7 @@ def example(pair: TruePair, config: OmnetConfig, rng: np.random.Generator) -> tu
     ValueError
         As `make_batch`.
     """
-    places = (centre(pair.target), centre(pair.source))
+    places = (pair.target.centre, pair.source.centre)
     batch, units = make_batch(pair.target.points, pair.source.points, config.points, rng, centres=places)
     return batch, compute_targets(torch.from_numpy(units.normalised(pair.T_target_source)))
 

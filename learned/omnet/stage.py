@@ -11,7 +11,7 @@ import numpy as np
 from hybridreg.geometry import se3
 from hybridreg.learned.stages.network_stage import NetworkStage
 from hybridreg.matches import Correspondences, Pose
-from hybridreg.scene import Scene, centre
+from hybridreg.scene import Scene
 
 if TYPE_CHECKING:
     from hybridreg.learned.omnet.network import OmnetNetwork
@@ -63,7 +63,7 @@ class OmNet(NetworkStage):
             levels[1].points,
             points,
             rng,
-            centres=(centre(levels[0]), centre(levels[1])),
+            centres=(levels[0].centre, levels[1].centre),
             device=self.device,
         )
         require_bytes(network.memory(batch), (points, points), self.device, "look at fewer with points=...")

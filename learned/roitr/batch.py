@@ -9,9 +9,9 @@ import numpy as np
 import numpy.typing as npt
 import torch
 
+from hybridreg.geometry.normals import estimate
 from hybridreg.learned.roitr.config import RoitrConfig
 from hybridreg.learned.roitr.point_levels import Levels, build_levels
-from hybridreg.normals import estimate
 
 
 @dataclass(frozen=True, kw_only=True)

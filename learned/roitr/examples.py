@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hybridreg.classical.voxel import voxel_centroids
+from hybridreg.geometry.voxel_cells import voxel_centroids
 from hybridreg.learned.roitr.batch import RoitrBatch, make_batch
 from hybridreg.learned.roitr.config import RoitrConfig
 from hybridreg.learned.roitr.targets import RoitrTargets, compute_targets

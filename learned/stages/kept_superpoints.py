@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Literal
 
 import numpy as np
 import torch
@@ -16,9 +15,7 @@ from hybridreg.learned.cross3dreg.superpoint_mask import Kept, choose
 from hybridreg.learned.stages.spreading import gather
 from hybridreg.learned.stages.tensor_values import array
 from hybridreg.matches import Overlap
-from hybridreg.scene import Level, Scene
-
-Side = Literal["source", "target"]
+from hybridreg.scene import Level, Scene, Side
 
 
 def keep(

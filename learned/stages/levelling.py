@@ -36,7 +36,7 @@ class Turns:
     @classmethod
     def upright(cls, scene: Scene) -> Turns | None:
         """What levels the clouds by the ground they show; None where neither is tilted."""
-        turns = [_upright(ground.find(scene, side)) for side in ("target", "source")]
+        turns = [_upright(scene.level(side).ground) for side in ("target", "source")]
         if all(turn is None for turn in turns):
             return None
         return cls(*(np.eye(3) if turn is None else turn for turn in turns))

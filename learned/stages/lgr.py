@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybridreg.classical.pose_modes import modes, same
-from hybridreg.classical.svd import kabsch
 from hybridreg.geometry import se3
 from hybridreg.geometry.consensus import Consensus
+from hybridreg.geometry.kabsch import kabsch
 from hybridreg.matches import Correspondences, Pose
 from hybridreg.runtime.threads import single
 from hybridreg.scene import Scene

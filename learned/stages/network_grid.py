@@ -8,7 +8,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from hybridreg.classical.voxel import voxel_centroids
+from hybridreg.geometry.voxel_cells import voxel_centroids
 from hybridreg.scene import Scene
 
 # Spacings that differ by less are one; beyond the second factor the scene itself may be of another size.

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hybridreg.classical.voxel import voxel_centroids
+from hybridreg.geometry.voxel_cells import voxel_centroids
 from hybridreg.learned.true_pair import TruePair
 from hybridreg.learned.vrhcf.batch import SphereBatch
 from hybridreg.learned.vrhcf.config import SphereNetConfig

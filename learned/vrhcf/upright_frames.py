@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 from torch.nn import functional as F
 
-from hybridreg.scene import Level, centre
+from hybridreg.scene import Level
 
 # Metres over the middle of a cloud that nobody knows the place of: axes that face it look upwards.
 _ABOVE = 100.0
@@ -21,7 +21,7 @@ def place(level: Level, facing: Literal["origin", "sensor"]) -> NDArray[np.float
     """Where (3,) the axes of a cloud's patches face, metres in its frame (`SphereNetConfig.facing`)."""
     if facing == "origin":
         return np.zeros(3)
-    return centre(level) if level.viewpoint is not None else centre(level) + [0.0, 0.0, _ABOVE]
+    return level.centre if level.viewpoint is not None else level.centre + [0.0, 0.0, _ABOVE]
 
 
 def reference_axes(patches: Tensor, keypoints: Tensor) -> Tensor:

@@ -7,8 +7,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from made_matches import planted, random_pose
 
-from hybridreg.classical.svd import STATUSES, WeightedSvd, kabsch, kabsch_batch
+from hybridreg.classical.svd import WeightedSvd
 from hybridreg.geometry import se3
+from hybridreg.geometry.kabsch import STATUSES, kabsch, kabsch_batch
 from hybridreg.matches import Correspondences
 
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from hybridreg.classical.visibility import Visibility
 from hybridreg.classical.voxel import VoxelGrid
 from hybridreg.cloud import PointCloud
-from hybridreg.geometry import ground, se3
+from hybridreg.geometry import se3
 from hybridreg.pair import Pair
 from hybridreg.scene import Scene
 
@@ -100,7 +100,7 @@ def test_how_the_sensors_hang_does_not_matter(tilt_deg: float) -> None:
 
 def test_ground_is_found_under_a_sensor_on_its_head() -> None:
     R = se3.rotation_about(np.array([np.pi, 0.0, 0.0]))
-    found = ground.find(scene_of(FAN, CIRCLE @ R.T), "target")
+    found = scene_of(FAN, CIRCLE @ R.T).target.ground
     assert found is not None
     assert found.up == pytest.approx([0.0, 0.0, -1.0], abs=0.02)
     assert found.above(np.zeros((1, 3)))[0] == pytest.approx(HEIGHT, abs=0.1)
@@ -121,14 +121,14 @@ def lane() -> Array:
 
 
 def test_a_wall_is_not_taken_for_the_ground_though_it_holds_more_points() -> None:
-    found = ground.find(scene_of(lane(), lane()), "source")
+    found = scene_of(lane(), lane()).source.ground
     assert found is not None
     assert found.up == pytest.approx([0.0, 0.0, 1.0], abs=0.05)
 
 
 def test_where_no_plane_is_level_a_steep_one_is_the_ground() -> None:
     R = se3.rotation_about(np.array([np.radians(70.0), 0.0, 0.0]))
-    found = ground.find(scene_of(CIRCLE @ R.T, CIRCLE), "source")
+    found = scene_of(CIRCLE @ R.T, CIRCLE).source.ground
     assert found is not None
     assert found.up == pytest.approx(R[:, 2], abs=0.05)
 
@@ -138,7 +138,7 @@ def test_no_ground_no_vertical_but_still_a_range() -> None:
     ball = directions / np.linalg.norm(directions, axis=1, keepdims=True)
     both = np.concatenate([30.0 * ball[:3000], 5.0 * ball[3000:]])
     scene = seen_from_origin(10.0 * ball, both, voxel=0.4)
-    assert ground.find(scene, "source") is None
+    assert scene.source.ground is None
     overlap = Visibility(baseline=2.0)(scene)
     distance = np.linalg.norm(scene.target.points, axis=1)
     assert overlap.target[distance > 20].max() == 0.0

@@ -8,10 +8,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hybridreg import Pair, Pipeline, PointCloud, VoxelGrid
-from hybridreg.classical import thinning
-from hybridreg.classical.voxel import voxel_centroids
+from hybridreg import Pair, Pipeline, PointCloud, VoxelGrid, thinning
 from hybridreg.geometry import voxel_cells as cells_of
+from hybridreg.geometry.voxel_cells import voxel_centroids
 from hybridreg.resolution import default_voxel
 from hybridreg.testing import sample_pair
 

@@ -24,9 +24,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hybridreg.evidence.support import model, terms
+from hybridreg.evidence.support import OK, model, terms
 from hybridreg.verdict.boosted import Boosted
-from hybridreg.verdict.confidence import NO_RIVAL, OK, confidence, features
+from hybridreg.verdict.confidence import NO_RIVAL, confidence, features
 from hybridreg.verdict.training.answers import TIERS, Row, gather, read
 from hybridreg.verdict.training.boosting import boost, continued, plain
 from hybridreg.verdict.training.calibration import draw

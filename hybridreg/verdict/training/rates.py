@@ -88,7 +88,7 @@ def best_wrong(clouds: Clouds, rng: np.random.Generator, n_starts: int = 8) -> A
 
 
 def _kiss(clouds: Clouds, voxel: float) -> Array | None:
-    from hybridreg.classical.voxel import voxel_centroids
+    from hybridreg.geometry.voxel_cells import voxel_centroids
 
     try:
         import kiss_matcher

@@ -1,42 +1,25 @@
 # SPDX-License-Identifier: MIT
-"""Normals of a level's points, computed once a run."""
+"""Normals of points, each from its nearest neighbours."""
 
 from __future__ import annotations
-
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from hybridreg.runtime.optional_packages import load
-from hybridreg.scene import Level, Scene
 
 Array = NDArray[np.float64]
-Side = Literal["source", "target"]
 
 # small_gicp gives no normal to a point with fewer neighbours.
 _FEWEST = 5
-
-
-def of(scene: Scene, side: Side, k: int = 20) -> Array:
-    """Normals (n, 3) of one level from each point's k nearest neighbours, shared by the stages of the run."""
-    level: Level = getattr(scene, side)
-    return scene.shared(("normals", side, k), lambda: estimate(level.points, level.viewpoint, k))
-
-
-def tree(scene: Scene, side: Side) -> cKDTree:
-    """KD-tree of one level, shared by the stages of the run."""
-    level: Level = getattr(scene, side)
-    return scene.shared(("tree", side), lambda: cKDTree(level.points))
 
 
 def estimate(points: Array, viewpoint: Array | None, k: int = 20) -> Array:
     """Normals (n, 3) of `points` (n, 3): the direction of least spread among the k nearest neighbours.
 
     Of unit length, towards the sensor at `viewpoint` (3,), the nearest of several (k, 3), or upwards where its place is
-    not known. The wheel of
-    small_gicp computes them four times as fast as numpy does.
+    not known. By small_gicp, which takes a quarter of numpy's time.
     """
     small_gicp = load("small_gicp", "every estimate of normals")
     k = min(k, len(points))
