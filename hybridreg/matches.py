@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -83,6 +83,31 @@ class Correspondences:
         return cls(source=np.zeros((0, 3)), target=np.zeros((0, 3)), weight=np.zeros(0))
 
 
+# Elements of two matrices of one pose differ by less: rounding, when a rotation is made exact.
+_SAME = 1e-9
+
+
+class EntryTrace(NamedTuple):
+    """What one entry of several did for a pose.
+
+    Attributes
+    ----------
+    entry : the short names of its stages
+    seconds : wall time, with settling and refining what it offered
+    poses : how many poses it offered
+    log_odds : that its best is right, were there no other; None where it offered none
+    problem : why it could not run; None where it did
+    won : the pose is its own
+    """
+
+    entry: str
+    seconds: float
+    poses: int
+    log_odds: float | None
+    problem: str | None = None
+    won: bool = False
+
+
 @dataclass(frozen=True, eq=False)
 class Pose:
     """An estimated pose.
@@ -99,6 +124,13 @@ class Pose:
         False where the stage had nothing to work with and T is only a placeholder (the identity).
     recipes : int
         Methods that came to T independently of one another.
+    hypotheses : tuple
+        What the estimator knows about T and each of the rivals (`hybridreg.search.hypothesis.Hypothesis`), in that
+        order; the verdict need not compute it again. Empty where it knows nothing.
+    weighed : object or None
+        What the verdict would weigh, where the estimator has done so (`hybridreg.verdict.judgement.Weighed`).
+    entries : tuple of EntryTrace
+        What each entry did, where the estimator tried several.
     """
 
     T: Array
@@ -106,6 +138,13 @@ class Pose:
     rivals: Array = field(default_factory=lambda: np.zeros((0, 4, 4)))
     found: bool = True
     recipes: int = 1
+    hypotheses: tuple[Any, ...] = ()
+    weighed: Any = None
+    entries: tuple[EntryTrace, ...] = ()
+
+    def is_at(self, T: Array) -> bool:
+        """Whether T (4, 4) is this pose but for the rounding of a rotation made exact."""
+        return bool(np.allclose(self.T, T, rtol=0.0, atol=_SAME))
 
     @classmethod
     def ranked(cls, poses: Sequence[Array], inliers: NDArray[np.bool_] | None = None) -> Pose:

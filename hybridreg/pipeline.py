@@ -21,7 +21,7 @@ from hybridreg.matches import Correspondences, Overlap, Pose
 from hybridreg.pair import Pair
 from hybridreg.resolution import tolerance
 from hybridreg.result import RegistrationResult
-from hybridreg.runtime.resources import peak_memory_mb, reset_peak_memory, stopwatch
+from hybridreg.runtime.resources import Clock, peak_memory_mb, reset_peak_memory
 from hybridreg.scene import Scene
 from hybridreg.slots import SLOTS
 from hybridreg.stage import Stage, own_params
@@ -137,7 +137,7 @@ class Pipeline(Stage):
     def conclude(self, trace: Trace, *, seed: int = 0) -> RegistrationResult:
         """The verdict on a traced run, and its result in the coordinates that the user gave."""
         pair = trace.scene.pair
-        with stopwatch(trace.seconds, "verdict"):
+        with trace.scene.clock.phase("verdict"):
             from hybridreg.verdict import judge
 
             judgement = judge(trace.scene, trace.refined, trace.matches)
@@ -157,6 +157,7 @@ class Pipeline(Stage):
             seed=seed,
             spec=self.to_spec(),
             tolerance=tolerance(pair.source, pair.target),
+            entries=trace.estimated.entries,
         )
 
     def trace(self, pair: Pair, *, seed: int = 0, matches: Any = None) -> Trace:
@@ -166,9 +167,9 @@ class Pipeline(Stage):
         fitting.check_image(self, pair)
         fitting.check_seed(seed)
         rng = np.random.default_rng([seed, zlib.crc32(pair.id.encode())])
-        seconds: dict[str, float] = {}
-        with stopwatch(seconds, "downsample"):
-            scene = self.downsample(pair)
+        clock = Clock()
+        with clock.phase("downsample"):
+            scene = replace(self.downsample(pair), clock=clock)
         fitting.check_scene(scene)
         for name, cloud in (("source", scene.pair.source), ("target", scene.pair.target)):
             if len(cloud.seen.places) != 1:
@@ -177,20 +178,20 @@ class Pipeline(Stage):
                 scene.note(
                     f"{cloud.dropped} points of the {name} were missing (not finite, or at 0, 0, 0) and were dropped"
                 )
-        with stopwatch(seconds, "overlap"):
+        with clock.phase("overlap"):
             overlap = self.overlap(scene)
-        with stopwatch(seconds, "match"):
+        with clock.phase("match"):
             if matches is None:
                 found = scene.matched(self.match(scene, overlap))
             else:
                 found = scene.matched(lower_matches(matches, pair))
-        with stopwatch(seconds, "estimate"):
+        with clock.phase("estimate"):
             estimated = _proper(self.estimate(scene, found, rng))
-        with stopwatch(seconds, "refine"):
+        with clock.phase("refine"):
             refined = _proper(self.refine(scene, estimated)) if estimated.found else estimated
         if not len(found):  # an estimator that runs recipes of its own may have matched
             found = of_most(scene, refined.T)
-        return Trace(scene, overlap, found, estimated, refined, seconds)
+        return Trace(scene, overlap, found, estimated, refined, clock.seconds)
 
 
 def _places(cloud: PointCloud) -> str:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybridreg.geometry.fitness import Overlay
-from hybridreg.matches import Correspondences
+from hybridreg.matches import Correspondences, EntryTrace
 from hybridreg.resolution import VEHICLES, Tolerance
 
 Array = NDArray[np.float64]
@@ -53,12 +53,16 @@ class RegistrationResult:
     notes : tuple of str
         Defaults that were chosen and caps that bit.
     seconds : mapping of str to float
-        Wall time of each stage.
+        Wall time of each slot and of the verdict; what an estimator matches, refines or weighs on its own counts
+        there.
     peak_memory_mb : float or None
         Highest resident memory of the process during the run.
     seed : int
     spec : mapping
         The pipeline that made it, as `Pipeline.save` writes it.
+    entries : tuple of EntryTrace
+        What each entry of `Candidates` did, how long it took, and which one the pose came from; empty where the
+        pipeline has one estimator.
     tolerance : Tolerance
         What "right" means to `confidence`: within so many degrees, and so many metres at the middle of the source.
     """
@@ -78,6 +82,7 @@ class RegistrationResult:
     seed: int
     spec: Mapping[str, Any] = field(repr=False)
     tolerance: Tolerance = VEHICLES
+    entries: tuple[EntryTrace, ...] = ()
 
     @property
     def T_target_source(self) -> Array:
@@ -137,7 +142,7 @@ class RegistrationResult:
 def _plain(value: Any) -> Any:
     if isinstance(value, np.ndarray):
         return value.tolist()
-    if isinstance(value, Tolerance):
+    if isinstance(value, (Tolerance, EntryTrace)):
         return value._asdict()
     if isinstance(value, Mapping):
         return {key: _plain(item) for key, item in value.items()}

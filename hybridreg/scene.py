@@ -17,6 +17,7 @@ from hybridreg.geometry.ground import Ground
 from hybridreg.geometry.voxel_cells import voxel_centroids
 from hybridreg.matches import Correspondences
 from hybridreg.pair import Pair
+from hybridreg.runtime.resources import Clock
 from hybridreg.thinning import thinned
 
 Array = NDArray[np.float64]
@@ -89,6 +90,8 @@ class Scene:
         Mistakes of the user's under which the clouds would fit: what the verdict's reasons begin with.
     matches : list of Correspondences
         What the run's matchers found so far, each with one match at least.
+    clock : Clock
+        Where the time of the run goes.
     """
 
     pair: Pair
@@ -97,6 +100,7 @@ class Scene:
     notes: list[str] = field(default_factory=list)
     explanations: list[str] = field(default_factory=list)
     matches: list[Correspondences] = field(default_factory=list)
+    clock: Clock = field(default_factory=Clock, repr=False)
     _shared: dict[Hashable, Any] = field(default_factory=dict, repr=False)
     _grids: dict[float, Scene] = field(default_factory=dict, repr=False)
 

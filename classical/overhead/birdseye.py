@@ -13,13 +13,15 @@ from numpy.typing import NDArray
 from hybridreg.classical.overhead.overhead_columns import FromAbove, from_above
 from hybridreg.classical.overhead.planar_climb import climb
 from hybridreg.classical.overhead.sweep import sweep
-from hybridreg.evidence.support import NEARLY
+from hybridreg.evidence.log_odds import NEARLY
 from hybridreg.geometry import se3
 from hybridreg.geometry.ground import Ground
 from hybridreg.matches import Correspondences, Pose
 from hybridreg.resolution import map_cell
 from hybridreg.scene import Level, Scene, Side
-from hybridreg.search.rivals import BEYOND_DOUBT, Rival, best_first, distinct, highest
+from hybridreg.search.hypothesis import Found, Hypothesis, as_pose
+from hybridreg.search.ranking import BEYOND_DOUBT, best, distinct
+from hybridreg.search.settle import best_first
 from hybridreg.stage import Stage
 
 Array = NDArray[np.float64]
@@ -98,26 +100,25 @@ class BirdsEye(Stage):
         if not found:
             scene.note("bird's-eye search: nothing stands on the ground")
             return Pose.unknown()
-        return Pose.ranked([one.T for one in distinct(scene, found)])
+        return as_pose(distinct(scene, found))
 
-    def _laid(self, scene: Scene, own: Scene, frames: Sequence[Array], voxel: float) -> list[Rival]:
+    def _laid(self, scene: Scene, own: Scene, frames: Sequence[Array], voxel: float) -> list[Hypothesis]:
         # The best poses where each cloud is levelled by one frame (T_level_source, T_level_target).
         T_level_source, T_level_target = frames
         source, target = (self._view(own, s, T, voxel) for s, T in zip(_SIDES, frames, strict=True))
         if len(source.filled.layer) == 0 or len(target.filled.layer) == 0:
             return []
         T_target_level = se3.inverse(T_level_target)
-        found: list[Rival] = []
+        found: list[Hypothesis] = []
         for levelled in _LEVELLED[: None if self.again else 1]:
             poses = [
                 T_target_level @ M @ T_level_source for M in self._planar(source, target, voxel, levelled)
             ]
             for some, plain in ((poses[:_FIRST], BEYOND_DOUBT), (poses[_FIRST:], NEARLY)):
-                found += best_first(scene, some)
-                found.sort(key=lambda rival: -rival.support)
-                if found and found[0].support >= plain:
+                found = best([*found, *best_first(scene, some)])
+                if found and found[0].log_odds >= plain:
                     return found
-            if highest(scene) < _LOST:
+            if Found.of(scene).highest < _LOST:
                 return found
         if not found or not self.again:
             return found

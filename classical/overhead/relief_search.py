@@ -15,7 +15,9 @@ from hybridreg.evidence import views
 from hybridreg.geometry import se3
 from hybridreg.matches import Correspondences, Pose
 from hybridreg.scene import Scene
-from hybridreg.search.rivals import best_first, distinct, resting
+from hybridreg.search.hypothesis import as_pose
+from hybridreg.search.ranking import distinct
+from hybridreg.search.settle import best_first, resting
 from hybridreg.stage import Stage
 
 Array = NDArray[np.float64]
@@ -46,7 +48,8 @@ class ReliefSearch(Stage):
         limits.at_least(self, 1, "tries")
 
     def __call__(self, scene: Scene, matches: Correspondences, rng: np.random.Generator) -> Pose:
-        source, target = (view.relief for view in views.views(scene))
+        both = views.of(scene)
+        source, target = both.source.relief, both.target.relief
         if source is None or target is None:
             scene.note("relief search: no ground found in both clouds")
             return Pose.unknown()
@@ -61,4 +64,4 @@ class ReliefSearch(Stage):
         ]
         # What pulls on a field are the few things that stand on it, which may draw a pose off its ground.
         found = [*best_first(scene, poses), *resting(scene, poses)]
-        return Pose.ranked([one.T for one in distinct(scene, found)])
+        return as_pose(distinct(scene, found))

@@ -1,27 +1,30 @@
 # SPDX-License-Identifier: MIT
-"""Several recipes for one pose, the cheapest first, until one answer is beyond doubt."""
+"""Several entries for one pose, the cheapest first, until one answer is beyond doubt."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, fields, is_dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from hybridreg import fitting, spec
+from hybridreg import fitting, registry, spec
 from hybridreg.candidates import input_mistakes
-from hybridreg.evidence import match_agreement, support
-from hybridreg.evidence.support import NEARLY, OK
+from hybridreg.evidence import match_agreement
+from hybridreg.evidence.log_odds import NEARLY, OK
+from hybridreg.evidence.pose_evidence import PoseEvidence
 from hybridreg.io.shipped_weights import MissingWeights
-from hybridreg.matches import Correspondences, Overlap, Pose
+from hybridreg.matches import Correspondences, EntryTrace, Overlap, Pose
 from hybridreg.resolution import comparable, size_ratio
 from hybridreg.scene import Scene
-from hybridreg.search import rivals
 from hybridreg.search.basin_hopping import hop
+from hybridreg.search.hypothesis import Hypothesis, as_pose
 from hybridreg.search.pattern_search import climb
-from hybridreg.search.rivals import Rival
+from hybridreg.search.ranking import HOPELESS, counted, distinct
+from hybridreg.search.settle import best_first, second_look
 from hybridreg.stage import Stage
 from hybridreg.verdict import weigh
 
@@ -29,25 +32,33 @@ Array = NDArray[np.float64]
 Entry = Mapping[str, Any]
 
 _SLOTS = ("overlap", "match", "estimate")
-# Confidence from which the user is believed to have made no mistake.
+# Confidence from which the user is believed to have made no mistake: by hand.
 _SURE = 0.99
-# Poses looked at of each entry: its own and the best of its rivals; how many of these are refined at most.
-_LOOKED_AT, _REFINED = 8, 2
-# The best poses of all, which are looked around when no entry brought certainty, unless their log-odds lie below this
-# (half a metre beside the right pose they may well be there) or so much below those of the best.
-_LOOKED_AROUND, _LOST, _BEHIND = 4, -7.0, 6.0
-# Log-odds below which a settled pose is not refined, and by which its support may fall when it is refined.
-_HOPELESS, _NOISE = -3.0, 1.0
-# Log-odds above which a pose is weighed, and moved to where more speaks for it, unless surfaces hold it by themselves:
-# the least information per point along any direction that they need for that.
-_LIKELY, _WEAK = 0.0, 0.01
+# Poses of each entry that are looked at, its own and the best of its rivals: by hand.
+_LOOKED_AT = 8
+# How many of these are refined at most: by hand.
+_REFINED = 2
+# The best poses of all, which are looked around when no entry brought certainty: by hand.
+_LOOKED_AROUND = 4
+# Log-odds below which they are not: half a metre beside the right pose they may well be there; by hand.
+_LOST = -7.0
+# Log-odds below the best pose's from which they are not: on 200 pairs of `sim:val`, `sim:train` and hard kinds.
+_BEHIND = 6.0
+# Log-odds below which a settled pose is not refined: by hand.
+_UNREFINED = -3.0
+# Log-odds by which a pose may fall when it is refined: by hand.
+_NOISE = 1.0
+# Log-odds above which a pose is weighed, and moved to where it is likelier unless surfaces hold it: by hand.
+_LIKELY = 0.0
+# Information per point along the weakest direction from which surfaces hold a pose by themselves: by hand.
+_WEAK = 0.01
 
 
 @dataclass(frozen=True, kw_only=True)
 class Candidates(Stage):
     """Try recipes in turn and return the pose that both clouds support best.
 
-    Every pose that an entry offers is settled and ranked by the verdict's own support (`hybridreg.evidence.support`),
+    Every pose that an entry offers is settled and ranked by its log-odds (`hybridreg.evidence.log_odds`),
     the best ones are refined, and the best of these is weighed with the others as its rivals. A pose to which
     several entries came is believed the more; one that surfaces hardly hold is moved to where it has more support.
     Later entries are not run once the confidence is `enough`; when none brings it, all that was tried is looked at a
@@ -85,17 +96,25 @@ class Candidates(Stage):
             raise ValueError(f"enough={self.enough} must lie between 0 and 1")
 
     def __call__(self, scene: Scene, matches: Correspondences, rng: np.random.Generator) -> Pose:
-        found: list[Rival] = []
-        confidence = 0.0
-        for found in self._worth_trying(scene).stages(scene, matches, rng):
+        found: list[Hypothesis] = []
+        traces: list[EntryTrace] = []
+        pose, confidence = Pose.unknown(len(matches)), 0.0
+        for found in self._worth_trying(scene).stages(scene, matches, rng, traces):
+            if not found:
+                continue
+            pose, confidence = as_pose(found), 0.0
             # To weigh a pose takes as long as to find some, and one that is rather wrong is not "ok".
-            likely = bool(found) and found[0].support > _LIKELY
-            confidence = weigh(scene, rivals.as_pose(found)).confidence if likely else 0.0
+            if found[0].log_odds > _LIKELY:
+                with scene.clock.phase("verdict"):
+                    pose = replace(pose, weighed=weigh(scene, pose))
+                confidence = pose.weighed.confidence
             if confidence >= self.enough:
                 break
         if confidence < _SURE:
-            scene.explanations.extend(input_mistakes.explanations(scene))
-        return rivals.as_pose(found) if found else Pose.unknown(len(matches))
+            with scene.clock.phase("verdict"):
+                scene.explanations.extend(input_mistakes.explanations(scene))
+        won = found[0].came_from if found else None
+        return replace(pose, entries=tuple(trace._replace(won=trace.entry == won) for trace in traces))
 
     def _worth_trying(self, scene: Scene) -> Candidates:
         source, target = scene.pair.source, scene.pair.target
@@ -107,61 +126,110 @@ class Candidates(Stage):
         return replace(self, of=self.of[:1])
 
     def stages(
-        self, scene: Scene, matches: Correspondences, rng: np.random.Generator
-    ) -> Iterator[list[Rival]]:
-        """What is found after each entry, and after a second look at the end, the best supported first."""
-        found: list[Rival] = []
-        answers: list[list[Rival]] = []
+        self,
+        scene: Scene,
+        matches: Correspondences,
+        rng: np.random.Generator,
+        traces: list[EntryTrace] | None = None,
+    ) -> Iterator[list[Hypothesis]]:
+        """What is found after each entry, and after a second look at the end, the likeliest first.
+
+        What each entry did is appended to `traces`.
+        """
+        traces = [] if traces is None else traces
+        found: list[Hypothesis] = []
+        offered: list[list[Hypothesis]] = []
         missing: list[str] = []
         # A generator each, so that an entry's answer does not hang on those before it.
         *generators, last = rng.spawn(len(self.of) + 1)
         for entry, own in zip(self.of, generators, strict=True):
+            name, start = _name(entry), time.perf_counter()
+            here: list[Hypothesis] = []
+            problem = None
             try:
                 pose = _pose(entry, scene, matches, own)
             except (ImportError, MissingWeights) as error:
-                missing.append(_left_out(entry, scene, error))
+                problem = _left_out(entry, scene, error)
+                missing.append(problem)
                 pose = Pose.unknown()
             if pose.found and np.isfinite(pose.T).all():
-                offered = rivals.best_first(scene, [pose.T, *pose.rivals[: _LOOKED_AT - 1]])
-                answers.append(offered)
-                found = _polished(scene, rivals.counted(scene, self._joined(scene, found, offered), answers))
+                starts = pose.hypotheses or [pose.T, *pose.rivals]
+                here = [one.but(came_from=name) for one in best_first(scene, starts[:_LOOKED_AT])]
+                offered.append(here)
+                found = _polished(scene, counted(scene, self._joined(scene, found, here), offered))
             if len(missing) == len(self.of):
                 raise ImportError(f"none of its {len(missing)} recipes can be run here: {missing[0]}")
+            traces.append(_traced(name, start, here, problem))
             yield found
-        if not found or found[0].support < rivals.HOPELESS:
+        if not found or found[0].log_odds < HOPELESS:
             return
-        found = rivals.counted(scene, rivals.distinct(scene, [*found, *rivals.second_look(scene)]), answers)
-        least = max(_LOST, found[0].support - _BEHIND)
-        hopeful = [one for one in found[:_LOOKED_AROUND] if one.support > least]
+        start = time.perf_counter()
+        here = [one.but(came_from=_AGAIN) for one in second_look(scene)]
+        found = counted(scene, distinct(scene, [*found, *here]), offered)
+        least = max(_LOST, found[0].log_odds - _BEHIND)
+        hopeful = [one for one in found[:_LOOKED_AROUND] if one.log_odds > least]
         if hopeful:
-            near = rivals.distinct(scene, hop(scene, np.array([one.T for one in hopeful]), last))
-            yield _polished(scene, rivals.counted(scene, self._joined(scene, found, near), answers))
+            near = distinct(scene, hop(scene, np.array([one.T for one in hopeful]), last))
+            near = [one.but(came_from=_AGAIN) for one in near]
+            found = _polished(scene, counted(scene, self._joined(scene, found, near), offered))
+            traces.append(_traced(_AGAIN, start, near, None))
+            yield found
 
-    def _joined(self, scene: Scene, found: list[Rival], offered: list[Rival]) -> list[Rival]:
-        best = max(one.support for one in [*found, *offered])
+    def _joined(self, scene: Scene, found: list[Hypothesis], offered: list[Hypothesis]) -> list[Hypothesis]:
+        highest = max(one.log_odds for one in [*found, *offered])
         # Refining a wrong pose costs most: nothing there lets it rest, and what is nearest is far away.
-        near = [one for one in offered if one.support > max(best - NEARLY, _HOPELESS)][:_REFINED]
+        near = [one for one in offered if one.log_odds > max(highest - NEARLY, _UNREFINED)][:_REFINED]
         refined = [self._refined(scene, one) for one in near]
-        return rivals.distinct(scene, [*found, *refined, *offered[len(near) :]])
+        return distinct(scene, [*found, *refined, *offered[len(near) :]])
 
-    def _refined(self, scene: Scene, settled: Rival) -> Rival:
-        T = self.refine(scene, Pose(settled.T)).T
-        value = support.support(support.numbers(*support.seen(scene, T)))
-        # Along a corridor a refinement may slide away; else it is nearer than what settled, whatever its support.
-        return Rival(T, value) if value > settled.by_surfaces - _NOISE else settled
+    def _refined(self, scene: Scene, settled: Hypothesis) -> Hypothesis:
+        with scene.clock.phase("refine"):
+            moved = PoseEvidence(settled.at.views, self.refine(scene, Pose(settled.T)).T)
+        # Along a corridor a refinement may slide away; else it is nearer than what settled, however likely that is.
+        if moved.by_surfaces <= settled.by_surfaces - _NOISE:
+            return settled
+        return Hypothesis(at=moved, by_surfaces=moved.by_surfaces, came_from=settled.came_from)
 
 
-def _polished(scene: Scene, found: list[Rival]) -> list[Rival]:
+# What the second look at all that was tried is called among the entries.
+_AGAIN = "second look"
+
+
+def _polished(scene: Scene, found: list[Hypothesis]) -> list[Hypothesis]:
     # Along a direction that surfaces hardly hold, a refinement follows their noise; what else speaks holds it better.
     first, *others = found
-    if first.support <= _LIKELY or support.seen(scene, first.T)[1].weakest >= _WEAK:
+    if first.log_odds <= _LIKELY or first.polished or first.at.information.weakest >= _WEAK:
         return found
-    climbed = scene.shared(("polished", first.T.tobytes()), lambda: climb(scene, first.T))
+    climbed = climb(first.at.views, first.T)
     if climbed.by_surfaces < first.by_surfaces + _NOISE:
-        return found
-    scene.shared(("polished", climbed.T.tobytes()), lambda: climbed)
-    agree = match_agreement.share(scene, climbed.T)
-    return [first._replace(T=climbed.T, by_surfaces=climbed.by_surfaces, matched=agree), *others]
+        return [first.but(polished=True), *others]
+    matched = match_agreement.share(scene, climbed.T)
+    return [
+        first.but(at=climbed, by_surfaces=climbed.by_surfaces, matched=matched, settled=False, polished=True),
+        *others,
+    ]
+
+
+def _name(entry: Entry) -> str:
+    return " + ".join(_called(stage) for stage in entry.values())
+
+
+def _called(stage: Any) -> str:
+    # The short name, with what differs from the stage's defaults.
+    name = (registry.name_of(stage) or type(stage).__name__).rpartition(".")[2]
+    if not is_dataclass(stage):
+        return name
+    changed = [
+        f"{field.name}={value}"
+        for field in fields(stage)
+        if isinstance(value := getattr(stage, field.name), (str, int, float)) and value != field.default
+    ]
+    return f"{name} ({', '.join(changed)})" if changed else name
+
+
+def _traced(name: str, start: float, offered: Sequence[Hypothesis], problem: str | None) -> EntryTrace:
+    highest = max((one.log_odds for one in offered), default=None)
+    return EntryTrace(name, time.perf_counter() - start, len(offered), highest, problem)
 
 
 def _built(entry: Entry) -> Entry:
@@ -187,7 +255,9 @@ def _pose(entry: Entry, scene: Scene, matches: Correspondences, rng: np.random.G
         for stage in entry.values():
             fitting.check_stage_image(stage, scene.pair)
         if "match" in entry:
-            matches = scene.matched(entry["match"](scene, _overlap(entry, scene)))
+            overlap = _overlap(entry, scene)
+            with scene.clock.phase("match"):
+                matches = scene.matched(entry["match"](scene, overlap))
         return entry["estimate"](scene, matches, rng)
     except MissingWeights:
         raise
@@ -199,7 +269,8 @@ def _pose(entry: Entry, scene: Scene, matches: Correspondences, rng: np.random.G
 def _overlap(entry: Entry, scene: Scene) -> Overlap:
     if "overlap" not in entry:
         return Overlap.full(len(scene.source), len(scene.target))
-    found: Overlap = entry["overlap"](scene)
+    with scene.clock.phase("overlap"):
+        found: Overlap = entry["overlap"](scene)
     return found
 
 

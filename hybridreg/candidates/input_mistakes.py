@@ -11,12 +11,13 @@ from numpy.typing import NDArray
 
 from hybridreg import spec
 from hybridreg.cloud import PointCloud
-from hybridreg.evidence.support import OK
+from hybridreg.evidence.log_odds import OK
 from hybridreg.matches import Correspondences
 from hybridreg.pair import Pair
 from hybridreg.resolution import comparable, size_ratio
 from hybridreg.scene import Scene
-from hybridreg.search.rivals import HOPELESS, seen_at
+from hybridreg.search.hypothesis import seen_at
+from hybridreg.search.ranking import HOPELESS
 from hybridreg.verdict import weigh
 
 Array = NDArray[np.float64]
@@ -74,6 +75,6 @@ def _fit(pair: Pair) -> float:
     scene = spec.from_table("voxel", "downsample")(pair)
     search = spec.from_table({"stage": "birdseye", "tries": _TRIES, "again": False}, "estimate")
     pose = search(scene, Correspondences.none(), np.random.default_rng(0))
-    if not pose.found or seen_at(scene, [pose.T], 1)[0].support < HOPELESS:
+    if not pose.found or seen_at(scene, [pose.T], 1)[0].log_odds < HOPELESS:
         return 0.0
     return weigh(scene, pose).confidence

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybridreg.evidence.orientation import overturned
-from hybridreg.evidence.views import View
+from hybridreg.evidence.views import View, Views
 from hybridreg.geometry import se3
 from hybridreg.geometry.ground_relief import Alike, alike
 from hybridreg.geometry.main_axes import faced, main_axes
@@ -102,14 +102,15 @@ class Agreement:
         return float(self.looked[1:].sum()), float(self.agreed[1:].sum()), float(self.through[1:].sum())
 
 
-def compare(source: View, target: View, T_target_source: Array, spacing: float, every: int = 1) -> Agreement:
-    """Evidence for one pose (4, 4), from each cloud's asked points or from `every` so-many-th of them."""
-    return compare_each(source, target, T_target_source[None], spacing, every)[0]
+def compare(views: Views, T_target_source: Array, stride: int = 1) -> Agreement:
+    """Agreement under one pose (4, 4), from every `stride`-th of each cloud's sampled points."""
+    return compare_each(views, T_target_source[None], stride)[0]
 
 
-def compare_each(source: View, target: View, poses: Array, spacing: float, every: int = 1) -> list[Agreement]:
+def compare_each(views: Views, poses: Array, stride: int = 1) -> list[Agreement]:
     """The same for poses (b, 4, 4): on few points that takes a third of the time that one by one takes."""
-    rows_source, rows_target = source.asked[::every], target.asked[::every]
+    source, target, spacing = views.source, views.target, views.spacing
+    rows_source, rows_target = source.asked[::stride], target.asked[::stride]
     forward = one_way(source, rows_source, target, poses, spacing)
     backward = one_way(target, rows_target, source, se3.inverse(poses), spacing)
     own = target.normals[rows_target]
@@ -128,10 +129,10 @@ def compare_each(source: View, target: View, poses: Array, spacing: float, every
             source=forward.of(row),
             target=backward.of(row),
             axes=axes[row],
-            looked=every * looked[row],
-            agreed=every * agreed[row],
-            through=every * through[row],
-            relief=alike(source.relief, target.relief, T, every),
+            looked=stride * looked[row],
+            agreed=stride * agreed[row],
+            through=stride * through[row],
+            relief=alike(source.relief, target.relief, T, stride),
             overturned=overturned(source, target, T),
         )
         for row, T in enumerate(poses)

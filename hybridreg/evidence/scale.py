@@ -8,10 +8,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from hybridreg.evidence import views
-from hybridreg.evidence.surface_distance import closeness, fine_surfaces
+from hybridreg.evidence.surface_distance import closeness
+from hybridreg.evidence.views import Views
 from hybridreg.geometry.point_to_plane import descend
-from hybridreg.scene import Scene
 
 Array = NDArray[np.float64]
 
@@ -32,27 +31,22 @@ class Size(NamedTuple):
     gain: float = 0.0
 
 
-def size(scene: Scene, T_target_source: Array) -> Size:
-    """Size at which the source fits best about a pose (4, 4)."""
-
-    def look() -> Size:
-        T = T_target_source
-        fitted = _fitted(scene, T)
-        scale = float(np.cbrt(np.linalg.det(fitted[:3, :3])))
-        if not _LEAST < abs(np.log(max(scale, 1e-9))) < np.log(_MOST):
-            return Size()
-        gain = closeness(scene, fitted) - closeness(scene, T)
-        return Size(scale, gain) if gain > 0.0 else Size()
-
-    return scene.shared(("verdict", "size", T_target_source.tobytes()), look)
+def size(views: Views, T_target_source: Array, close: float) -> Size:
+    """Size at which the source fits best about a pose (4, 4) whose closeness is `close`."""
+    fitted = _fitted(views, T_target_source)
+    scale = float(np.cbrt(np.linalg.det(fitted[:3, :3])))
+    if not _LEAST < abs(np.log(max(scale, 1e-9))) < np.log(_MOST):
+        return Size()
+    gain = closeness(views.fine, fitted) - close
+    return Size(scale, gain) if gain > 0.0 else Size()
 
 
-def _fitted(scene: Scene, T: Array) -> Array:
-    source, target = views.views(scene)
-    spacing = views.spacing(scene)
-    points = source.points[source.settling[:_POINTS]]
-    M = descend(T, points, target, [_step(reach * spacing, spacing) for reach in _ROUGHLY], sized=True)
-    fine, surfaces = fine_surfaces(scene)
+def _fitted(views: Views, T: Array) -> Array:
+    spacing = views.spacing
+    points = views.source.points[views.source.settling[:_POINTS]]
+    roughly = [_step(reach * spacing, spacing) for reach in _ROUGHLY]
+    M = descend(T, points, views.target, roughly, sized=True)
+    fine, surfaces = views.fine
     steps = [_step(part * surfaces.far, surfaces.noise) for part in _CLOSELY]
     return descend(M, fine.asked[:_POINTS], surfaces, steps, sized=True)
 

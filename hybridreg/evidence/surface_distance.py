@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,8 +20,8 @@ from hybridreg.cloud import PointCloud
 from hybridreg.geometry import se3
 from hybridreg.geometry.extent import bounds, reach
 from hybridreg.geometry.point_to_plane import descend
+from hybridreg.pair import Pair
 from hybridreg.runtime.cores import n_threads
-from hybridreg.scene import Scene
 
 Array = NDArray[np.float64]
 
@@ -81,7 +82,22 @@ class Surfaces:
         return self._normals[rows]
 
 
-def closeness(scene: Scene, T_target_source: Array, every: int = 1) -> float:
+class FineSurfaces(NamedTuple):
+    """Both clouds of a pair."""
+
+    source: Surfaces
+    target: Surfaces
+
+    @classmethod
+    def of(cls, pair: Pair) -> FineSurfaces:
+        """Made side by side: most of it is sorting and trees, which each take one thread."""
+        clouds = (pair.source, pair.target)
+        scale = min(1.0, *(reach(cloud.radii) / _FROM for cloud in clouds)) or 1.0
+        with ThreadPoolExecutor(min(2, n_threads())) as pool:
+            return cls(*pool.map(lambda cloud: _surfaces(cloud, scale), clouds))
+
+
+def closeness(fine: FineSurfaces, T_target_source: Array, stride: int = 1) -> float:
     """Nats per point by which a right pose explains the distances across the surfaces better than chance does.
 
     The log-likelihood of the points that have a partner near by, most of which lie on its surface but for noise, over
@@ -91,39 +107,22 @@ def closeness(scene: Scene, T_target_source: Array, every: int = 1) -> float:
     ----------
     T_target_source : (4, 4)
         A pose, or one with a size.
-    every : int
-        So many-th of the points are asked about.
+    stride : int
+        Every so many-th of the sampled points counts.
     """
-
-    def look() -> float:
-        source, target = fine_surfaces(scene)
-        back: Array = np.linalg.inv(T_target_source).astype(np.float64)  # of a pose with a size too
-        return max(
-            _one_way(source.asked[::every], target, T_target_source),
-            _one_way(target.asked[::every], source, back),
-        )
-
-    return scene.shared(("verdict", "closeness", every, T_target_source.tobytes()), look)
+    source, target = fine
+    back: Array = np.linalg.inv(T_target_source).astype(np.float64)  # of a pose with a size too
+    return max(
+        _one_way(source.asked[::stride], target, T_target_source),
+        _one_way(target.asked[::stride], source, back),
+    )
 
 
-def settle_closely(scene: Scene, T_target_source: Array) -> Array:
-    """Pose (4, 4) near by at which the source's points lie best on the target's surfaces as fine as these are."""
-    source, target = fine_surfaces(scene)
+def settle_closely(fine: FineSurfaces, T_target_source: Array) -> Array:
+    """Poses (..., 4, 4) near by at which the source's points lie best on the target's fine surfaces."""
+    source, target = fine
     steps = [(part * target.far, max(target.noise, _TRUST * part * target.far)) for part in _REACHES]
     return descend(T_target_source, source.asked[:_SETTLING], target, steps)
-
-
-def fine_surfaces(scene: Scene) -> tuple[Surfaces, Surfaces]:
-    """Of source and target, made once a run."""
-
-    def make() -> tuple[Surfaces, Surfaces]:
-        clouds = (scene.pair.source, scene.pair.target)
-        scale = min(1.0, *(reach(cloud.radii) / _FROM for cloud in clouds)) or 1.0
-        with ThreadPoolExecutor(min(2, n_threads())) as pool:
-            source, target = pool.map(lambda cloud: _surfaces(cloud, scale), clouds)
-            return source, target
-
-    return scene.shared(("verdict", "fine surfaces"), make)
 
 
 def _surfaces(cloud: PointCloud, scale: float) -> Surfaces:

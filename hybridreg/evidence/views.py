@@ -5,11 +5,13 @@ from __future__ import annotations
 
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from hybridreg.evidence.surface_distance import FineSurfaces
 from hybridreg.geometry import ground, normals
 from hybridreg.geometry.ground import Ground
 from hybridreg.geometry.ground_relief import Relief
@@ -69,24 +71,45 @@ class View:
         return self.normals[rows]
 
 
-def views(scene: Scene) -> tuple[View, View]:
-    """Source and target of a scene, made once a run."""
-    return scene.shared(("verdict", "views"), lambda: _both(scene))
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Views:
+    """Both clouds of a scene as the evidence looks at them.
+
+    Attributes
+    ----------
+    spacing : float
+        Resolution of the evidence, metres.
+    """
+
+    scene: Scene
+    source: View
+    target: View
+    spacing: float
+
+    @cached_property
+    def fine(self) -> FineSurfaces:
+        """Surfaces as fine as the clouds show them."""
+        return FineSurfaces.of(self.scene.pair)
+
+    @cached_property
+    def middle(self) -> Array:
+        """Centroid of the source's points, (1, 3)."""
+        return self.source.points.mean(axis=0, keepdims=True)
 
 
-def spacing(scene: Scene) -> float:
-    """Resolution of the evidence, metres."""
-    return scene.shared(("verdict", "spacing"), lambda: default_voxel(scene.pair.source, scene.pair.target))
+def of(scene: Scene) -> Views:
+    """The views of a scene, made once a run."""
+    return scene.shared("views", lambda: _both(scene))
 
 
-def _both(scene: Scene) -> tuple[View, View]:
-    wanted = spacing(scene)
+def _both(scene: Scene) -> Views:
+    spacing = default_voxel(scene.pair.source, scene.pair.target)
     on_grid = scene.at(map_cell(scene.pair.source, scene.pair.target))
     # Side by side: most of it is sorting and trees, which each take one thread.
     with ThreadPoolExecutor(min(2, n_threads())) as pool:
-        source = pool.submit(_view, scene, "source", wanted, on_grid)
-        target = pool.submit(_view, scene, "target", wanted, on_grid)
-        return source.result(), target.result()
+        source = pool.submit(_view, scene, "source", spacing, on_grid)
+        target = pool.submit(_view, scene, "target", spacing, on_grid)
+        return Views(scene=scene, source=source.result(), target=target.result(), spacing=spacing)
 
 
 def _view(scene: Scene, side: Side, wanted: float, on_grid: Scene) -> View:

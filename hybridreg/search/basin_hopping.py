@@ -12,12 +12,12 @@ from itertools import cycle
 import numpy as np
 from numpy.typing import NDArray
 
-from hybridreg.evidence import support, views
+from hybridreg.evidence import log_odds, views
 from hybridreg.evidence.surface_distance import closeness, settle_closely
 from hybridreg.geometry import se3
 from hybridreg.resolution import map_cell
 from hybridreg.scene import Scene
-from hybridreg.search.rivals import Rival, seen_at
+from hybridreg.search.hypothesis import Hypothesis, seen_at
 from hybridreg.search.settle import settle
 
 Array = NDArray[np.float64]
@@ -29,25 +29,23 @@ _HOPS, _TURN_DEG, _SHIFTS, _LEAST = 10, 3.0, (1.0, 4.0), 0.3
 _SETTLING, _LOOKING, _CLOSELY = 3, 3, 4
 
 
-def hop(scene: Scene, poses: Array, rng: np.random.Generator) -> list[Rival]:
-    """Where basin hopping (Wales and Doye 1997) for more support ends that begins at each of some poses (b, 4, 4).
+def hop(scene: Scene, poses: Array, rng: np.random.Generator) -> list[Hypothesis]:
+    """Where basin hopping (Wales and Doye 1997) for higher log-odds ends that begins at each of some poses (b, 4, 4).
 
-    A pose is shaken, settles anew, roughly and closely, and stays where it has more support and lies closer.
+    A pose is shaken, settles anew, roughly and closely, and stays where it is likelier.
     """
-    source, target = views.views(scene)
-    spacing = views.spacing(scene)
-    middle = source.points.mean(axis=0)
-    step = max(spacing, _LEAST * map_cell(scene.pair.source, scene.pair.target))
+    both = views.of(scene)
+    step = max(both.spacing, _LEAST * map_cell(scene.pair.source, scene.pair.target))
 
     def seen(poses: Array) -> Array:
-        close = [support.beside(0.0, closeness(scene, T, _CLOSELY)) for T in poses]
-        return np.array(support.of_each(source, target, poses, spacing, _LOOKING)) + close
+        close = [log_odds.beside(0.0, closeness(both.fine, T, _CLOSELY)) for T in poses]
+        return np.array(log_odds.of_each(both, poses, _LOOKING)) + close
 
     poses, best = poses.copy(), seen(poses)
     for _, shift in zip(range(_HOPS), cycle(_SHIFTS), strict=False):
-        starts = np.array([_shaken(T, middle, shift * step, rng) for T in poses])
-        roughly = settle(source, target, starts, spacing, every=_SETTLING)
-        for settled in (roughly, settle_closely(scene, roughly)):
+        starts = np.array([_shaken(T, both.middle, shift * step, rng) for T in poses])
+        roughly = settle(both, starts, stride=_SETTLING)
+        for settled in (roughly, settle_closely(both.fine, roughly)):
             value = seen(settled)
             better = value > best
             poses[better], best[better] = settled[better], value[better]
@@ -56,6 +54,6 @@ def hop(scene: Scene, poses: Array, rng: np.random.Generator) -> list[Rival]:
 
 def _shaken(T: Array, middle: Array, shift: float, rng: np.random.Generator) -> Array:
     # About the middle of the source, so that a turn leaves it where it is.
-    centre = se3.apply(T, middle[None])[0]
+    centre = se3.apply(T, middle)[0]
     turn = se3.rotation_about(np.radians(rng.normal(0.0, _TURN_DEG, 3)))
     return se3.about(centre, turn, rng.normal(0.0, shift, 3)) @ T

@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from hybridreg.evidence.views import View
+from hybridreg.evidence.views import Views
 from hybridreg.geometry import se3
 from hybridreg.geometry.main_axes import faced
 
@@ -23,12 +23,13 @@ _MOST, _APART = 4, 2
 _FEWEST = 20
 
 
-def copies(source: View, target: View, T_target_source: Array, axes: Array, spacing: float) -> list[Array]:
+def copies(views: Views, T_target_source: Array, axes: Array) -> list[Array]:
     """Poses (4, 4) beside a pose, shifted along the commonest surface, at which nearly as many things meet.
 
     Things are points that do not face the commonest way `axes[0]` (on a street, all but its ground); two meet in one
     cell of a grid.
     """
+    source, target, spacing = views.source, views.target, views.spacing
     frame = np.vstack([axes[1:], axes[:1]])  # the commonest direction last
     cell = _CELL * spacing
     rows = source.settling[faced(source.normals[source.settling] @ T_target_source[:3, :3].T, axes) > 0]

@@ -16,14 +16,13 @@ from typing import Literal
 
 import numpy as np
 
-from hybridreg.evidence.support import NEARLY, OK
+from hybridreg.evidence.evidence import NO_RIVAL, Evidence
+from hybridreg.evidence.log_odds import NEARLY, OK
 from hybridreg.verdict.boosted import Boosted
 
 Word = Literal["ok", "doubtful", "failed"]
 
 FAILED = 0.5
-# The rival margin where there is no rival to compare with, and the farthest that one counts.
-NO_RIVAL = -20.0
 # No more is believed of a pose that turns the world over, nor of one at which the source fits better by so many nats
 # per point at another size (of some 400 right training answers none gained 0.08).
 _OVERTURNED, DOUBTED, SIZE_GAIN = 0.3, 0.9, 0.12
@@ -60,8 +59,8 @@ SPEAKS = {
 _BOTH = ("looked_through", "visible", "fitness_visible")
 
 
-def confidence(evidence: Mapping[str, float], rule: Boosted | None = None) -> float:
-    """Probability in (0, 1) that the pose with this evidence (`hybridreg.verdict.judgement.evidence_of`) is right.
+def confidence(evidence: Evidence, rule: Boosted | None = None) -> float:
+    """Probability in (0, 1) that the pose with this evidence is right.
 
     By other trees than the shipped ones where a `rule` is given.
     """
@@ -70,7 +69,7 @@ def confidence(evidence: Mapping[str, float], rule: Boosted | None = None) -> fl
     probability = believed(rule(told), told["rival_margin"])
     if probability < FAILED and _one_of_two(told, rule):
         probability = FAILED
-    if evidence["overturned"]:
+    if evidence.overturned:
         return min(probability, _OVERTURNED)
     return min(probability, DOUBTED) if told["size_gain"] > SIZE_GAIN else probability
 
@@ -94,13 +93,14 @@ def trees() -> Boosted:
     return Boosted.read(json.loads(files("hybridreg.verdict").joinpath("confidence.json").read_text()))
 
 
-def features(evidence: Mapping[str, float]) -> dict[str, float]:
+def features(evidence: Evidence) -> dict[str, float]:
     """What the trees ask about, by the names in `SPEAKS`."""
-    told = {name: evidence[name] for name in SPEAKS if name in evidence}
+    facts = evidence.as_dict()
+    told = {name: facts[name] for name in SPEAKS if name in facts}
     for name in _BOTH:
-        sides = (evidence[f"{name}_source"], evidence[f"{name}_target"])
+        sides = (facts[f"{name}_source"], facts[f"{name}_target"])
         told |= {f"{name}_less": min(sides), f"{name}_more": max(sides)}
-    return {**told, "rival_margin": max(evidence["rival_margin"], NO_RIVAL)}
+    return {**told, "rival_margin": max(evidence.rival_margin, NO_RIVAL)}
 
 
 def word(probability: float) -> Word:

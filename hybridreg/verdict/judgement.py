@@ -3,24 +3,25 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from hybridreg.evidence import match_agreement, support, views
+from hybridreg.evidence import match_agreement
 from hybridreg.evidence.agreement import Agreement, OneWay
-from hybridreg.evidence.information import Information
-from hybridreg.evidence.scale import Size, size
-from hybridreg.evidence.support import NEARLY
-from hybridreg.evidence.surface_distance import closeness
+from hybridreg.evidence.evidence import NO_RIVAL, Evidence, share
+from hybridreg.evidence.log_odds import NEARLY, log_odds
+from hybridreg.evidence.pose_evidence import PoseEvidence
+from hybridreg.evidence.scale import Size
 from hybridreg.evidence.views import View
 from hybridreg.geometry.fitness import Overlay
 from hybridreg.matches import Correspondences, Pose
 from hybridreg.scene import Scene
 from hybridreg.search import rivals
-from hybridreg.search.rivals import Rival
-from hybridreg.verdict.confidence import DOUBTED, NO_RIVAL, Word, confidence, word
+from hybridreg.search.hypothesis import Hypothesis, of_pose
+from hybridreg.search.ranking import best, told_apart
+from hybridreg.verdict.confidence import DOUBTED, Word, confidence, word
 from hybridreg.verdict.words import reasons
 
 Array = NDArray[np.float64]
@@ -28,23 +29,20 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Weighed:
-    """What both clouds say about a pose.
+    """What both clouds say about a pose and its rivals.
 
     Attributes
     ----------
-    agreement : Agreement
-    held : Information
-    rivals : list of Rival
-        Settled, the best supported first.
-    evidence : dict of str to float
-        Always the same keys, see `evidence_of`.
+    at : PoseEvidence
+    rivals : list of Hypothesis
+        Settled, the likeliest first.
+    evidence : Evidence
     confidence : float in (0, 1)
     """
 
-    agreement: Agreement
-    held: Information
-    rivals: list[Rival]
-    evidence: dict[str, float]
+    at: PoseEvidence
+    rivals: list[Hypothesis]
+    evidence: Evidence
     confidence: float
 
 
@@ -58,7 +56,7 @@ class Judgement:
     confidence : float in [0, 1]
     reasons : tuple of str
     evidence : dict of str to float
-        Always the same keys, see `evidence_of`.
+        By the names of `hybridreg.evidence.evidence.Evidence`.
     overlay : Overlay
         The whole clouds under the pose, within twice the scene's spacing of one another.
     information : (6, 6) float64
@@ -82,121 +80,86 @@ def judge(scene: Scene, pose: Pose, matches: Correspondences) -> Judgement:
     The evidence is taken at a resolution of its own (`hybridreg.resolution.default_voxel`), so that it means the
     same whatever voxel the pipeline used. A pose that was not found is judged as what it is, a placeholder: failed.
     """
-    weighed = weigh(scene, pose)
-    evidence = {
-        **weighed.evidence,
-        "matches_agreeing": float(match_agreement.agreeing(scene, matches, pose.T)),
-    }
+    weighed = pose.weighed if isinstance(pose.weighed, Weighed) and pose.is_at(pose.weighed.at.T) else None
+    weighed = weighed or weigh(scene, pose)
+    evidence = replace(
+        weighed.evidence, matches_agreeing=float(match_agreement.agreeing(scene, matches, pose.T))
+    )
     probability = weighed.confidence if pose.found else 0.0
     if scene.explanations:
         probability = min(probability, DOUBTED)
+    why = reasons(
+        evidence, weighed.at.agreement, weighed.at.information, found=pose.found, unseen=_unseen(scene)
+    )
     return Judgement(
         verdict=word(probability),
         confidence=probability,
-        reasons=(
-            *scene.explanations,
-            *reasons(evidence, weighed.agreement, weighed.held, found=pose.found, unseen=_unseen(scene)),
-        ),
-        evidence=evidence,
+        reasons=(*scene.explanations, *why),
+        evidence=evidence.as_dict(),
         overlay=Overlay(scene.pair.source.points, scene.pair.target.points, pose.T, 2.0 * scene.spacing),
-        information=weighed.held.matrix,
-        rivals=_close(weighed.rivals, weighed.evidence["support"]),
+        information=weighed.at.information.matrix,
+        rivals=_close(weighed.rivals, evidence.support),
     )
 
 
 def weigh(scene: Scene, pose: Pose) -> Weighed:
-    """Evidence and confidence of a pose and its rivals, without what only the result needs.
-
-    Computed once for a pose, until another matcher has run: an estimator that weighed its answer spares the verdict
-    the work.
-    """
-    # Rounded, as the pipeline makes the rotation of a pose exact to the last digit.
-    key = tuple(np.round([pose.T, *pose.rivals], 9).ravel())
-    known = ("weighed", pose.found, pose.recipes, len(scene.matches), key)
-    return scene.shared(known, lambda: _weigh(scene, pose))
-
-
-def _weigh(scene: Scene, pose: Pose) -> Weighed:
-    agreement, held = support.seen(scene, pose.T)
-    _, target = views.views(scene)
-    found = rivals.find(scene, pose.T, agreement, held, pose.rivals) if pose.found else []
-    own = Rival(
-        pose.T,
-        support.support(support.numbers(agreement, held)),
-        pose.recipes,
-        match_agreement.share(scene, pose.T),
+    """Evidence and confidence of a pose and its rivals, without what only the result needs."""
+    at = of_pose(scene, pose)
+    own = Hypothesis(
+        at=at,
+        by_surfaces=at.by_surfaces,
+        recipes=pose.recipes,
+        matched=match_agreement.share(scene, pose.T),
     )
-    own, *found = rivals.told_apart(scene, [own, *found])
-    found.sort(key=lambda rival: -rival.support)
-    evidence = {
-        **evidence_of(agreement, held, own, found, target),
-        "closely": closeness(scene, pose.T),
-        **_at_another_size(scene, pose),
-    }
-    return Weighed(
-        agreement=agreement, held=held, rivals=found, evidence=evidence, confidence=confidence(evidence)
+    own, *found = told_apart([own, *(rivals.find(scene, at, pose) if pose.found else [])])
+    found = best(found)
+    evidence = evidence_of(own, found, at.size if pose.found else Size())
+    return Weighed(at=at, rivals=found, evidence=evidence, confidence=confidence(evidence))
+
+
+def evidence_of(own: Hypothesis, found: list[Hypothesis], size: Size) -> Evidence:
+    """All facts about a hypothesis beside its rivals, the likeliest of these first."""
+    agreement = own.at.agreement
+    evidence = Evidence.at(agreement, own.at.information, own.recipes, own.matched, own.closeness)
+    support = log_odds(evidence)
+    cosine, rmse = _surfaces(agreement.source, own.at.views.target)
+    (looked, hidden, covered), (looked_back, hidden_back, covered_back) = _seen(agreement)
+    return replace(
+        evidence,
+        support=support,
+        rival_margin=found[0].log_odds - support if found else NO_RIVAL,
+        normals=cosine,
+        inlier_rmse=rmse,
+        visible_source=looked,
+        visible_target=looked_back,
+        hidden_source=hidden,
+        hidden_target=hidden_back,
+        fitness_visible_source=covered,
+        fitness_visible_target=covered_back,
+        closely=own.at.closeness,
+        scale=size.scale,
+        size_gain=size.gain,
     )
 
 
-def _at_another_size(scene: Scene, pose: Pose) -> dict[str, float]:
-    scale, gain = size(scene, pose.T) if pose.found else Size()
-    return {"scale": scale, "size_gain": gain}
+def _seen(agreement: Agreement) -> list[tuple[float, float, float]]:
+    # Of source and target: shares looked at and hidden, and of those looked at the share with a point near by.
+    return [
+        (float(np.mean(way.looked)), float(np.mean(way.hidden)), share(way.covered & way.looked, way.looked))
+        for way in (agreement.source, agreement.target)
+    ]
 
 
-def evidence_of(
-    agreement: Agreement, held: Information, own: Rival, found: list[Rival], target: View
-) -> dict[str, float]:
-    """The numbers behind a verdict; shares lie between 0 and 1.
-
-    agreement_least, _middle, _most : agreeing share of the points that the other sensor looked at, for the axis
-        where it is least, the middle one, and the one where it is most
-    looked_least : points looked at for the axis with the fewest
-    looked_through, looked_through_source, _target : share of those that a sensor looked through; both clouds
-        together, and the points of one cloud
-    agreement_rare, looked_through_rare : agreeing share, and share looked through, of the points that do not face the
-        commonest way (on a field all but the ground); agreed_rare, through_rare : how many these are
-    relief_cells, relief_correlation : cells of ground that both clouds show, and how alike their small heights and
-        hollows are
-    visible_source, visible_target : share of a cloud's points that the other sensor looked at
-    hidden_source, hidden_target : share that stood behind something
-    fitness_visible_source, fitness_visible_target : share of the visible points with a point near by
-    normals : mean cosine between the normals of points and their neighbours
-    inlier_rmse : of the agreeing points to the other cloud's planes, metres
-    weakest : smallest eigenvalue of the information per point, at most 1/3
-    recipes : methods that came to the pose independently of one another
-    matched : agreeing share of the matches of that matcher of which most agree; 0 where none ran
-    closeness : how much less closely the points lie on the surfaces, to the sensors' noise, than under the rival where
-        they do most, nats per point; 0 where they lie most closely, or where no rival comes near
-    closely : how closely the points lie on the other cloud's surfaces, to the sensors' noise, nats per point
-    scale, size_gain : size at which the source fits better, and by how many nats per point; 1 and 0 where none does
-    overturned : 1 where the world is turned over or a sensor stands under the other's ground, else 0
-    support : log-odds that the pose is right, were there no other
-    rival_margin : how far the best rival's support lies above it (-20 without rivals)
-    """
-    numbers = support.numbers(agreement, held, own.recipes, own.matched, own.closeness)
-    of_pose = support.support(numbers)
-    evidence = {
-        **numbers,
-        "support": of_pose,
-        "rival_margin": found[0].support - of_pose if found else NO_RIVAL,
-        **_surfaces(agreement.source, target),
-    }
-    for name, way in (("source", agreement.source), ("target", agreement.target)):
-        evidence[f"visible_{name}"] = float(np.mean(way.looked))
-        evidence[f"hidden_{name}"] = float(np.mean(way.hidden))
-        evidence[f"fitness_visible_{name}"] = support.share(way.covered & way.looked, way.looked)
-    return evidence
-
-
-def _surfaces(way: OneWay, target: View) -> dict[str, float]:
+def _surfaces(way: OneWay, target: View) -> tuple[float, float]:
+    # Mean cosine between the normals of neighbours, and root mean square distance to the planes, metres.
     near, row = way.covered, way.match
     cosine = np.abs(np.sum(way.normals[near] * target.normals[row[near]], axis=1))
     agrees = way.agrees
     across = np.sum((way.moved[agrees] - target.points[row[agrees]]) * target.normals[row[agrees]], axis=1)
-    return {
-        "normals": float(cosine.mean()) if near.any() else 0.0,
-        "inlier_rmse": float(np.sqrt(np.mean(across**2))) if agrees.any() else 0.0,
-    }
+    return (
+        float(cosine.mean()) if near.any() else 0.0,
+        float(np.sqrt(np.mean(across**2))) if agrees.any() else 0.0,
+    )
 
 
 def _unseen(scene: Scene) -> dict[str, str]:
@@ -204,5 +167,5 @@ def _unseen(scene: Scene) -> dict[str, str]:
     return {name: cloud.seen.words for name, cloud in clouds.items() if cloud.viewpoint is None}
 
 
-def _close(found: list[Rival], support: float) -> Array:
-    return np.array([rival.T for rival in found if rival.support > support - NEARLY]).reshape(-1, 4, 4)
+def _close(found: list[Hypothesis], support: float) -> Array:
+    return np.array([rival.T for rival in found if rival.log_odds > support - NEARLY]).reshape(-1, 4, 4)

@@ -8,8 +8,9 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 
 from hybridreg.evidence.agreement import Agreement
+from hybridreg.evidence.evidence import Evidence
 from hybridreg.evidence.information import Information
-from hybridreg.evidence.support import NEARLY
+from hybridreg.evidence.log_odds import NEARLY
 from hybridreg.verdict.confidence import SIZE_GAIN
 
 # Where a number becomes worth a sentence. In simulated scenes nine in ten right poses stayed on the good side.
@@ -17,7 +18,7 @@ LOOKED_THROUGH, AGREEMENT, WEAK, OVERLAP, FEW = 0.12, 0.3, 0.02, 0.15, 60
 
 
 def reasons(
-    evidence: Mapping[str, float],
+    evidence: Evidence,
     agreement: Agreement,
     held: Information,
     *,
@@ -31,35 +32,35 @@ def reasons(
     return (*against, _in_favour(evidence)) if against else (_in_favour(evidence),)
 
 
-def _against(evidence: Mapping[str, float], agreement: Agreement, held: Information) -> Iterator[str]:
-    if evidence["overturned"]:
+def _against(evidence: Evidence, agreement: Agreement, held: Information) -> Iterator[str]:
+    if evidence.overturned:
         yield (
             "the pose turns the world over, or puts a sensor under the other cloud's ground; where one cloud may be "
             'upside down, say so: gravity="unknown" (--gravity unknown)'
         )
-    if evidence["size_gain"] > SIZE_GAIN:
+    if evidence.size_gain > SIZE_GAIN:
         yield (
-            f"the source fits better when it is multiplied by {evidence['scale']:.3f}: "
+            f"the source fits better when it is multiplied by {evidence.scale:.3f}: "
             "is it scaled, or its sensor's calibration off?"
         )
-    through = evidence["looked_through"]
+    through = evidence.looked_through
     if through > LOOKED_THROUGH:
         yield (
             f"the sensors looked through {through:.0%} of the points that they should have hit "
-            f"({evidence['looked_through_source']:.0%} of the source's, "
-            f"{evidence['looked_through_target']:.0%} of the target's)"
+            f"({evidence.looked_through_source:.0%} of the source's, "
+            f"{evidence.looked_through_target:.0%} of the target's)"
         )
     k = int(np.argmin(agreement.shares))
     if agreement.shares[k] < AGREEMENT:
         yield _about_axis(agreement, k)
-    margin = evidence["rival_margin"]
+    margin = evidence.rival_margin
     if margin > 0.0:
         yield f"another pose explains the data better (its support is higher by {margin:.2f}; see rivals)"
     elif margin > -NEARLY:
         yield f"another pose explains the data nearly as well (its support is lower by {-margin:.2f}; see rivals)"
     if held.weakest < WEAK:
         yield f"little holds the clouds {held.words}: {held.weakest:.1%} of the surfaces' information"
-    overlap = max(evidence["visible_source"], evidence["visible_target"])
+    overlap = max(evidence.visible_source, evidence.visible_target)
     if overlap < OVERLAP:
         yield f"little overlap: neither sensor looked at more than {overlap:.0%} of the other's points"
 
@@ -77,16 +78,16 @@ def _unknown(unseen: Mapping[str, str]) -> Iterator[str]:
         yield f"where the {name} was seen from is not known ({why}): free space could not be tested from there"
 
 
-def _in_favour(evidence: Mapping[str, float]) -> str:
-    cells = int(evidence["relief_cells"])
+def _in_favour(evidence: Evidence) -> str:
+    cells = int(evidence.relief_cells)
     relief = (
-        f"; the ground's hollows are alike by {evidence['relief_correlation']:.2f} (correlation over {cells} cells)"
+        f"; the ground's hollows are alike by {evidence.relief_correlation:.2f} (correlation over {cells} cells)"
         if cells >= FEW
         else ""
     )
     return (
-        f"of the points that the other sensor looked at, {evidence['fitness_visible_source']:.0%} of the source's and "
-        f"{evidence['fitness_visible_target']:.0%} of the target's have a neighbour there; "
-        f"{evidence['agreement_least']:.0%} or more agree along each axis, "
-        f"{evidence['looked_through']:.0%} were looked through{relief}"
+        f"of the points that the other sensor looked at, {evidence.fitness_visible_source:.0%} of the source's and "
+        f"{evidence.fitness_visible_target:.0%} of the target's have a neighbour there; "
+        f"{evidence.agreement_least:.0%} or more agree along each axis, "
+        f"{evidence.looked_through:.0%} were looked through{relief}"
     )

@@ -16,8 +16,8 @@ SHIFT = se3.from_rt(np.eye(3), np.array([3.0, 0.0, 0.0]))
 
 
 def agreement(made: Made, T: np.ndarray) -> Agreement:
-    source, target = views.views(made.scene)
-    return compare(source, target, T, views.spacing(made.scene))
+    source, target = views.of(made.scene)
+    return compare(views.of(made.scene), T)
 
 
 def test_at_the_true_pose_the_clouds_agree_along_every_axis(crossing: Made) -> None:
@@ -42,7 +42,7 @@ def test_points_that_the_other_sensor_could_not_see_do_not_count(fan: Made) -> N
 
 
 def test_evidence_is_the_same_seen_from_either_cloud(crossing: Made) -> None:
-    source, target = views.views(crossing.scene)
+    source, target = views.of(crossing.scene)
     spacing = views.spacing(crossing.scene)
     there = compare(source, target, crossing.truth, spacing)
     back = compare(target, source, se3.inverse(crossing.truth), spacing)
@@ -66,15 +66,15 @@ def test_few_points_count_for_little() -> None:
 
 
 def test_without_a_viewpoint_nothing_is_looked_through(crossing: Made) -> None:
-    source, target = (dataclasses.replace(view, image=None) for view in views.views(crossing.scene))
-    found = compare(source, target, SHIFT @ crossing.truth, views.spacing(crossing.scene))
+    source, target = (dataclasses.replace(view, image=None) for view in views.of(crossing.scene))
+    found = compare(views.of(crossing.scene), SHIFT @ crossing.truth)
     assert found.looked_through == 0.0
     assert not found.source.hidden.any()
     assert found.shares.min() < 0.35
 
 
 def test_a_share_of_the_asked_points_gives_nearly_the_same_shares(crossing: Made) -> None:
-    source, target = views.views(crossing.scene)
+    source, target = views.of(crossing.scene)
     spacing = views.spacing(crossing.scene)
     whole, part = (compare(source, target, crossing.truth, spacing, every=n) for n in (1, 5))
     assert part.shares == pytest.approx(whole.shares, abs=0.12)

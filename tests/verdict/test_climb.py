@@ -43,7 +43,7 @@ def test_a_pose_beside_the_right_one_climbs_to_it(
 
 def test_support_never_falls_and_the_ground_stays_where_it_is(yard: tuple[Scene, np.ndarray]) -> None:
     scene, truth = yard
-    source, target = views.views(scene)
+    source, target = views.of(scene)
     start = beside(truth, (2.0, -1.0), 15.0)
     end = climb(scene, start).T
     before, after = (support.of(source, target, T, views.spacing(scene), every=3) for T in (start, end))

@@ -11,7 +11,8 @@ from hybridreg.evidence.surface_distance import closeness, settle_closely
 from hybridreg.geometry import se3
 from hybridreg.matches import Pose
 from hybridreg.search import rivals
-from hybridreg.search.rivals import Rival, told_apart
+from hybridreg.search.hypothesis import Hypothesis
+from hybridreg.search.ranking import counted, told_apart
 from hybridreg.verdict import weigh
 
 

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hybridreg.evidence.support import NEARLY, OK, beside, model, support, terms
+from hybridreg.evidence.log_odds import NEARLY, OK, beside, model, support, terms
 from hybridreg.verdict.boosted import Boosted
 from hybridreg.verdict.confidence import FAILED, NO_RIVAL, SPEAKS, believed, confidence, features, trees, word
 from hybridreg.verdict.training.boosting import boost, plain

@@ -40,7 +40,7 @@ def about_middle(made: Made, factor: float) -> np.ndarray:
 
 
 def test_a_pose_that_turns_the_world_over_is_failed(crossing: Made) -> None:
-    source, target = views.views(crossing.scene)
+    source, target = views.of(crossing.scene)
     assert not overturned(source, target, crossing.truth)
     over = se3.from_rt(se3.rotation_about(np.array([np.pi, 0.0, 0.0])), np.array([0.0, 0.0, -3.6]))
     assert overturned(source, target, over @ crossing.truth)
@@ -51,13 +51,13 @@ def test_a_pose_that_turns_the_world_over_is_failed(crossing: Made) -> None:
 
 def test_a_pose_that_puts_a_sensor_under_the_ground_is_failed(crossing: Made) -> None:
     sunk = se3.from_rt(np.eye(3), np.array([0.0, 0.0, -5.0])) @ crossing.truth
-    assert overturned(*views.views(crossing.scene), sunk)
+    assert overturned(*views.of(crossing.scene), sunk)
 
 
 def test_where_gravity_is_unknown_nothing_is_turned_over(crossing: Made) -> None:
     scene = VoxelGrid()(replace(crossing.scene.pair, gravity="unknown"))
     over = se3.from_rt(se3.rotation_about(np.array([np.pi, 0.0, 0.0])), np.array([0.0, 0.0, -3.6]))
-    assert not overturned(*views.views(scene), over @ crossing.truth)
+    assert not overturned(*views.of(scene), over @ crossing.truth)
     with pytest.raises(ValueError, match="gravity"):
         Pair.of(np.eye(3), np.eye(3), gravity="down")
 
@@ -86,7 +86,7 @@ def test_a_map_that_holds_a_place_twice_shows_its_other_copy(crossing: Made) -> 
     twice = np.vstack([pair.target.points, se3.apply(copy, pair.target.points)])
     scene = VoxelGrid()(Pair.of(pair.source.points, twice))
     found = copies(
-        *views.views(scene), crossing.truth, support.seen(scene, crossing.truth)[0].axes, views.spacing(scene)
+        *views.of(scene), crossing.truth, support.seen(scene, crossing.truth)[0].axes, views.spacing(scene)
     )
     off = [se3.inverse(copy @ crossing.truth) @ T for T in found]
     assert min(np.linalg.norm(T[:3, 3]) for T in off) < 1.0

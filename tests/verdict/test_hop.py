@@ -35,7 +35,7 @@ def wrong_by(T: np.ndarray, truth: np.ndarray) -> tuple[float, float]:
 
 def started(scene: Scene, truth: np.ndarray) -> np.ndarray:
     # So far off along the street that settling comes to rest on the way.
-    source, target = views.views(scene)
+    source, target = views.of(scene)
     return settle(source, target, se3.from_rt(np.eye(3), [2.4, 0.6, 0.0]) @ truth, views.spacing(scene))
 
 
@@ -50,7 +50,7 @@ def test_a_pose_that_rests_beside_the_right_one_leaves_for_it(street: tuple[Scen
 
 def test_support_and_closeness_are_no_less_than_before(street: tuple[Scene, np.ndarray]) -> None:
     scene, truth = street
-    source, target = views.views(scene)
+    source, target = views.of(scene)
     start = started(scene, truth)
     (end,) = hop(scene, start[None], np.random.default_rng(1))
     before, after = (

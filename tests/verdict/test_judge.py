@@ -19,7 +19,7 @@ NONE = Correspondences.none()
 
 def settled(scene: Scene, T: np.ndarray) -> np.ndarray:
     """A wrong pose where it fits best: what a registration would return."""
-    return settle(*views.views(scene), T, views.spacing(scene))
+    return settle(views.of(scene), T)
 
 
 def words(judgement: Judgement) -> str:

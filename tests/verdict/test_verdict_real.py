@@ -42,7 +42,7 @@ def test_true_pose_ok_and_its_half_turn_and_slides_failed(real_data: Path, name:
     half = se3.rotation_about(np.pi * up)
     wrong = [se3.from_rt(half, truth[:3, 3] - half @ truth[:3, 3]) @ truth]
     wrong += [se3.from_rt(np.eye(3), metres * street) @ truth for metres in (-10.0, 10.0)]
-    for T in (settle(*views.views(scene), T, views.spacing(scene)) for T in wrong):
+    for T in (settle(views.of(scene), T) for T in wrong):
         if np.linalg.norm((T - truth)[:3, 3]) > 1.0 or se3.angle_deg(T[:3, :3] @ truth[:3, :3].T) > 5.0:
             judgement = judge(scene, Pose(T), Correspondences.none())
             assert judgement.verdict == "failed", judgement.reasons
@@ -58,7 +58,7 @@ def test_different_places_are_failed(real_data: Path) -> None:
         pytest.skip("not all pairs are there")
     for i, source in enumerate(PAIRS):
         scene = scene_of(real_data, source, PAIRS[i - 1])
-        both, spacing = views.views(scene), views.spacing(scene)
+        both, spacing = views.of(scene), views.spacing(scene)
         settled = [settle(*both, se3.yaw(float(yaw)), spacing) for yaw in range(0, 360, 120)]
         covered = [np.isfinite(_gaps(scene, T)).mean() for T in settled]
         judgement = judge(scene, Pose(settled[int(np.argmax(covered))]), Correspondences.none())
@@ -66,5 +66,5 @@ def test_different_places_are_failed(real_data: Path) -> None:
 
 
 def _gaps(scene: Scene, T: np.ndarray) -> np.ndarray:
-    source, target = views.views(scene)
+    source, target = views.of(scene)
     return target.tree.query(se3.apply(T, source.points), distance_upper_bound=0.5)[0]

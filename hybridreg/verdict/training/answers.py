@@ -24,13 +24,16 @@ import hybridreg as hr
 from hybridreg.data import hard, open_dataset
 from hybridreg.data.hard.box_world_scans import sight
 from hybridreg.eval.score import metrics
-from hybridreg.evidence import match_agreement, support
+from hybridreg.evidence import match_agreement, views
+from hybridreg.evidence.evidence import Evidence
+from hybridreg.evidence.pose_evidence import PoseEvidence
 from hybridreg.frames import lower_pose
 from hybridreg.geometry import se3
 from hybridreg.matches import Correspondences, Pose
 from hybridreg.pair import Pair
 from hybridreg.scene import Scene
-from hybridreg.search.rivals import Rival, as_pose, told_apart
+from hybridreg.search.hypothesis import Hypothesis, as_pose
+from hybridreg.search.ranking import told_apart
 from hybridreg.verdict import weigh
 
 Array = NDArray[np.float64]
@@ -70,7 +73,7 @@ def labelled(tier: str, i: int) -> Labelled:
 def answers(scene: Scene, truths: Sequence[Array], metres: float) -> Iterator[Row]:
     """Evidence of the answers to one pair."""
     candidates = hr.Pipeline.preset("default").estimate
-    stages: list[list[Rival]] = []
+    stages: list[list[Hypothesis]] = []
     for found in candidates.stages(scene, Correspondences.none(), np.random.default_rng(0)):
         if found:
             stages.append(found)
@@ -87,28 +90,33 @@ def answers(scene: Scene, truths: Sequence[Array], metres: float) -> Iterator[Ro
             yield {**_told(scene, wrong), "right": False, "weight": share * AS_IF}
 
 
-def _told(scene: Scene, found: list[Rival]) -> Row:
+def _told(scene: Scene, found: list[Hypothesis]) -> Row:
     weighed = weigh(scene, as_pose(found))
     rival = [
-        {**weigh(scene, Pose(one.T, found=False)).evidence, "closeness": one.closeness}
+        {**weigh(scene, Pose(one.T, found=False)).evidence.as_dict(), "closeness": one.closeness}
         for one in weighed.rivals[:1]
     ]
-    return {"evidence": weighed.evidence, "rival": rival}
+    return {"evidence": weighed.evidence.as_dict(), "rival": rival}
 
 
-def _ranked(scene: Scene, found: list[Rival], truths: Sequence[Array], metres: float) -> Row:
+def _ranked(scene: Scene, found: list[Hypothesis], truths: Sequence[Array], metres: float) -> Row:
     # Evidence of the poses, and the rows of the right ones. What is nearly right is left out.
     poses = [(one, _right(scene, one.T, truths, metres)) for one in found[:_RANKED]]
     poses = [pose for pose in poses if pose[1] is not None]
     if truths and not any(right for _, right in poses):
         truth = lower_pose(truths[0], scene.pair)
-        own = support.support(support.numbers(*support.seen(scene, truth)))
-        poses = [*poses, (Rival(truth, own, matched=match_agreement.share(scene, truth)), True)]
-    told = told_apart(scene, [one._replace(closeness=0.0) for one, _ in poses])
+        at = PoseEvidence(views.of(scene), truth)
+        matched = match_agreement.share(scene, truth)
+        poses = [*poses, (Hypothesis(at=at, by_surfaces=at.by_surfaces, matched=matched), True)]
+    told = told_apart([one.but(closeness=0.0) for one, _ in poses])
     evidence = [
-        support.numbers(*support.seen(scene, one.T), one.recipes, one.matched, one.closeness) for one in told
+        Evidence.at(one.at.agreement, one.at.information, one.recipes, one.matched, one.closeness)
+        for one in told
     ]
-    return {"evidence": evidence, "right": [k for k, (_, right) in enumerate(poses) if right]}
+    return {
+        "evidence": [one.as_dict() for one in evidence],
+        "right": [k for k, (_, right) in enumerate(poses) if right],
+    }
 
 
 def _right(scene: Scene, T: Array, truths: Sequence[Array], metres: float) -> bool | None:

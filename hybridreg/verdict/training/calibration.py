@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from hybridreg.eval.run import store
 from hybridreg.eval.run.row import Row
 from hybridreg.eval.score import metrics
-from hybridreg.evidence.support import OK
+from hybridreg.evidence.log_odds import OK
 
 Array = NDArray[np.float64]
 # Borders of the curve's bins: few answers lie in the middle, and "ok" has one of its own.

@@ -24,9 +24,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hybridreg.evidence.support import OK, model, terms
+from hybridreg.evidence.evidence import NO_RIVAL, Evidence
+from hybridreg.evidence.log_odds import OK, model, terms
 from hybridreg.verdict.boosted import Boosted
-from hybridreg.verdict.confidence import NO_RIVAL, confidence, features
+from hybridreg.verdict.confidence import confidence, features
 from hybridreg.verdict.training.answers import TIERS, Row, gather, read
 from hybridreg.verdict.training.boosting import boost, continued, plain
 from hybridreg.verdict.training.calibration import draw
@@ -41,9 +42,11 @@ def fit_support(rows: list[Row]) -> tuple[dict[str, float], float]:
     right, or none where none is, each by the odds that its own terms give it."""
     from scipy.optimize import minimize
 
-    names = list(terms(rows[0]["evidence"]))
+    names = list(terms(Evidence(**rows[0]["evidence"])))
     pairs = [row["ranked"] for row in rows if row.get("ranked") and row["ranked"]["evidence"]]
-    X = np.array([list(terms(evidence).values()) for pair in pairs for evidence in pair["evidence"]])
+    X = np.array(
+        [list(terms(Evidence(**evidence)).values()) for pair in pairs for evidence in pair["evidence"]]
+    )
     first = np.cumsum([0, *(len(pair["evidence"]) for pair in pairs)])[:-1]
     right = np.concatenate([np.isin(np.arange(len(p["evidence"])), p["right"]) for p in pairs])
     none = np.array([not pair["right"] for pair in pairs])
@@ -84,14 +87,15 @@ def fit(rows: list[Row]) -> Rule:
     return Rule(weights, intercept, Boosted.read(stored), stored)
 
 
-def _with_support(rows: list[Row], weights: dict[str, float], intercept: float) -> Iterator[dict[str, float]]:
+def _with_support(rows: list[Row], weights: dict[str, float], intercept: float) -> Iterator[Evidence]:
     # The evidence, with support and margin as this rule tells them.
     for row in rows:
         own, *rival = (
-            intercept + sum(weights[name] * value for name, value in terms(evidence).items())
+            intercept + sum(weights[name] * value for name, value in terms(Evidence(**evidence)).items())
             for evidence in (row["evidence"], *row["rival"])
         )
-        yield {**row["evidence"], "support": own, "rival_margin": rival[0] - own if rival else NO_RIVAL}
+        told = {**row["evidence"], "support": own, "rival_margin": rival[0] - own if rival else NO_RIVAL}
+        yield Evidence(**told)
 
 
 def longer(rows: list[Row]) -> Rule:
@@ -164,7 +168,7 @@ def main() -> None:
     if options.write and options.what == "continue":
         (options.write / "confidence.json").write_text(json.dumps(rule.stored_trees) + "\n")
     elif options.write:
-        (options.write / "support.json").write_text(json.dumps(support, indent=2) + "\n")
+        (options.write.parent / "evidence" / "log_odds.json").write_text(json.dumps(support, indent=2) + "\n")
         (options.write / "confidence.json").write_text(json.dumps(rule.stored_trees) + "\n")
 
 

@@ -20,7 +20,8 @@ import numpy as np
 
 from hybridreg.classical.voxel import VoxelGrid
 from hybridreg.data import open_dataset
-from hybridreg.evidence import support
+from hybridreg.evidence import views
+from hybridreg.evidence.agreement import compare
 
 # Borders of the table's classes, points.
 BORDERS = (0, 5, 20, 50, 100, 200, np.inf)
@@ -33,7 +34,7 @@ def observed(data: str) -> Iterator[tuple[float, bool]]:
     """Of each pair of a data set, under the true pose: agreeing points that do not face the commonest way, and whether
     the ground is alike."""
     for labelled in open_dataset(data):
-        agreement, _ = support.seen(VoxelGrid()(labelled.pair), labelled.T_target_source)
+        agreement = compare(views.of(VoxelGrid()(labelled.pair)), labelled.T_target_source)
         yield agreement.rare[1], agreement.relief.information >= TELLS
 
 
