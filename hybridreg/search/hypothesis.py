@@ -97,9 +97,9 @@ def as_pose(found: Sequence[Hypothesis]) -> Pose:
 
 
 def of_pose(scene: Scene, pose: Pose) -> PoseEvidence:
-    """Evidence for a pose: that of the hypothesis it was made of, where a refinement has not moved it since."""
+    """Evidence for a pose: that of the hypothesis it was made of, where nothing has moved it since."""
     for one in pose.hypotheses[:1]:
-        if isinstance(one, Hypothesis) and pose.is_at(one.T):
+        if isinstance(one, Hypothesis) and np.array_equal(one.T, pose.T):
             return one.at
     return PoseEvidence(views.of(scene), pose.T)
 

@@ -122,9 +122,9 @@ def test_a_pose_that_several_entries_came_to_counts_as_many_recipes() -> None:
     assert apart.recipes == 1
     doubt, belief = (weigh(sample_scene()[0], pose) for pose in (one, two))
     # Recipes count in the confidence alone.
-    assert belief.evidence["support"] == pytest.approx(doubt.evidence["support"], abs=1e-6)
+    assert belief.evidence.support == pytest.approx(doubt.evidence.support, abs=1e-6)
     assert belief.confidence >= doubt.confidence
-    assert belief.evidence["recipes"] == 2.0
+    assert belief.evidence.recipes == 2.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -146,8 +146,8 @@ def test_matches_that_agree_with_a_pose_speak_for_it() -> None:
     for entry, share in ((few, 0.1), (many, 0.8)):
         scene = sample_scene()[0]
         found = weigh(scene, run(entry, scene=scene))
-        assert found.evidence["matched"] == share
-        supports.append(found.evidence["support"])
+        assert found.evidence.matched == share
+        supports.append(found.evidence.support)
     assert supports[0] < supports[1]
 
 
@@ -167,7 +167,7 @@ def test_what_every_entry_found_can_be_followed() -> None:
     stages = list(hr.Candidates(of=entries).stages(sample_scene()[0], NONE, np.random.default_rng(0)))
     assert [len(found) for found in stages[:-1]] == [1, 1, 2]
     assert is_right(stages[-1][0].T)
-    supports = [one.support for one in stages[-1]]
+    supports = [one.log_odds for one in stages[-1]]
     assert supports == sorted(supports, reverse=True)
 
 

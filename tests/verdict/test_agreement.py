@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 from __future__ import annotations
 
-import dataclasses
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -16,7 +16,6 @@ SHIFT = se3.from_rt(np.eye(3), np.array([3.0, 0.0, 0.0]))
 
 
 def agreement(made: Made, T: np.ndarray) -> Agreement:
-    source, target = views.of(made.scene)
     return compare(views.of(made.scene), T)
 
 
@@ -42,10 +41,9 @@ def test_points_that_the_other_sensor_could_not_see_do_not_count(fan: Made) -> N
 
 
 def test_evidence_is_the_same_seen_from_either_cloud(crossing: Made) -> None:
-    source, target = views.of(crossing.scene)
-    spacing = views.spacing(crossing.scene)
-    there = compare(source, target, crossing.truth, spacing)
-    back = compare(target, source, se3.inverse(crossing.truth), spacing)
+    both = views.of(crossing.scene)
+    there = compare(both, crossing.truth)
+    back = compare(replace(both, source=both.target, target=both.source), se3.inverse(crossing.truth))
     assert np.array_equal(there.looked, back.looked)
     assert np.array_equal(there.agreed, back.agreed)
     assert there.looked_through == back.looked_through
@@ -66,15 +64,14 @@ def test_few_points_count_for_little() -> None:
 
 
 def test_without_a_viewpoint_nothing_is_looked_through(crossing: Made) -> None:
-    source, target = (dataclasses.replace(view, image=None) for view in views.of(crossing.scene))
-    found = compare(views.of(crossing.scene), SHIFT @ crossing.truth)
+    both = views.of(crossing.scene)
+    blind = replace(both, source=replace(both.source, image=None), target=replace(both.target, image=None))
+    found = compare(blind, SHIFT @ crossing.truth)
     assert found.looked_through == 0.0
     assert not found.source.hidden.any()
     assert found.shares.min() < 0.35
 
 
 def test_a_share_of_the_asked_points_gives_nearly_the_same_shares(crossing: Made) -> None:
-    source, target = views.of(crossing.scene)
-    spacing = views.spacing(crossing.scene)
-    whole, part = (compare(source, target, crossing.truth, spacing, every=n) for n in (1, 5))
+    whole, part = (compare(views.of(crossing.scene), crossing.truth, stride=n) for n in (1, 5))
     assert part.shares == pytest.approx(whole.shares, abs=0.12)

@@ -7,7 +7,7 @@ import pytest
 from hybridreg.classical.voxel import VoxelGrid
 from hybridreg.cloud import PointCloud
 from hybridreg.data.hard import box_world
-from hybridreg.evidence import support, views
+from hybridreg.evidence import log_odds, views
 from hybridreg.geometry import se3
 from hybridreg.pair import Pair
 from hybridreg.scene import Scene
@@ -36,17 +36,16 @@ def test_a_pose_beside_the_right_one_climbs_to_it(
 ) -> None:
     scene, truth = yard
     start = beside(truth, metres, turn_deg)
-    step = climb(scene, start).T @ se3.inverse(truth)
+    step = climb(views.of(scene), start).T @ se3.inverse(truth)
     assert se3.angle_deg(step[:3, :3]) < 1.0
     assert np.linalg.norm(step[:3, 3]) < 0.35 < np.linalg.norm((start @ se3.inverse(truth))[:3, 3])
 
 
 def test_support_never_falls_and_the_ground_stays_where_it_is(yard: tuple[Scene, np.ndarray]) -> None:
     scene, truth = yard
-    source, target = views.of(scene)
     start = beside(truth, (2.0, -1.0), 15.0)
-    end = climb(scene, start).T
-    before, after = (support.of(source, target, T, views.spacing(scene), every=3) for T in (start, end))
+    end = climb(views.of(scene), start).T
+    before, after = (log_odds.of(views.of(scene), T, stride=3) for T in (start, end))
     assert after >= before
     step = end @ se3.inverse(start)
     assert abs(step[2, 2]) == pytest.approx(1.0, abs=1e-3)

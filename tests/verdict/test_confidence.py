@@ -1,14 +1,17 @@
 # SPDX-License-Identifier: MIT
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hybridreg.evidence.log_odds import NEARLY, OK, beside, model, support, terms
+from hybridreg.evidence.evidence import NO_RIVAL, Evidence
+from hybridreg.evidence.log_odds import NEARLY, OK, beside, log_odds, model, terms
 from hybridreg.verdict.boosted import Boosted
-from hybridreg.verdict.confidence import FAILED, NO_RIVAL, SPEAKS, believed, confidence, features, trees, word
+from hybridreg.verdict.confidence import FAILED, SPEAKS, believed, confidence, features, trees, word
 from hybridreg.verdict.training.boosting import boost, plain
 
 share = st.floats(0.0, 1.0)
@@ -26,25 +29,25 @@ EVIDENCE = {
     "relief_cells": st.floats(0.0, 3000.0),
     "relief_correlation": st.floats(-1.0, 1.0),
     "weakest": st.floats(0.0, 1.0 / 3.0),
+    "looked_least": st.floats(0.0, 3000.0),
     "recipes": st.integers(1, 5),
     "matched": share,
     "closeness": st.floats(-3.0, 0.0),
     "overturned": st.sampled_from([0.0, 1.0]),
 }
-own = st.fixed_dictionaries(EVIDENCE)
-log_odds = st.floats(-15.0, 15.0)
+own = st.builds(Evidence, **EVIDENCE)
+odds = st.floats(-15.0, 15.0)
 WHOLE = EVIDENCE | {
-    "looked_least": st.floats(0.0, 3000.0),
     "visible_source": share,
     "visible_target": share,
     "fitness_visible_source": share,
     "fitness_visible_target": share,
     "closely": st.floats(-1.7, 2.5),
     "size_gain": st.floats(0.0, 2.0),
-    "support": log_odds,
+    "support": odds,
     "rival_margin": st.floats(NO_RIVAL, 10.0),
 }
-whole = st.fixed_dictionaries(WHOLE)
+whole = st.builds(Evidence, **WHOLE)
 
 
 @given(
@@ -54,72 +57,73 @@ whole = st.fixed_dictionaries(WHOLE)
     share,
 )
 def test_more_agreement_and_fewer_objections_never_lower_the_support(
-    numbers: dict[str, float], name: str, step: float
+    numbers: Evidence, name: str, step: float
 ) -> None:
     against = "through" in name
-    better = {**numbers, name: numbers[name] + (-step if against else 1 if name == "recipes" else step)}
-    assert support(better) >= support(numbers)
+    more = -step if against else 1 if name == "recipes" else step
+    assert log_odds(replace(numbers, **{name: getattr(numbers, name) + more})) >= log_odds(numbers)
 
 
 def test_the_rule_weighs_the_terms_and_nothing_else() -> None:
-    numbers = {
-        "agreement_least": 0.5,
-        "agreement_middle": 0.6,
-        "agreement_most": 0.9,
-        "looked_through": 0.1,
-        "looked_through_source": 0.2,
-        "looked_through_target": 0.05,
-        "agreement_rare": 0.5,
-        "looked_through_rare": 0.1,
-        "agreed_rare": 40.0,
-        "through_rare": 8.0,
-        "relief_cells": 200.0,
-        "relief_correlation": 0.3,
-        "weakest": 0.02,
-        "recipes": 1,
-        "matched": 0.4,
-        "closeness": -0.2,
-        "overturned": 0.0,
-    }
+    numbers = Evidence(
+        agreement_least=0.5,
+        agreement_middle=0.6,
+        agreement_most=0.9,
+        looked_through=0.1,
+        looked_through_source=0.2,
+        looked_through_target=0.05,
+        agreement_rare=0.5,
+        looked_through_rare=0.1,
+        agreed_rare=40.0,
+        through_rare=8.0,
+        relief_cells=200.0,
+        relief_correlation=0.3,
+        weakest=0.02,
+        recipes=1,
+        matched=0.4,
+        closeness=-0.2,
+        overturned=0.0,
+        looked_least=40.0,
+    )
     assert set(model().weights) == set(terms(numbers))
-    assert support({**numbers, "normals": 0.9}) == support(numbers)
+    assert log_odds(replace(numbers, normals=0.9)) == log_odds(numbers)
 
 
 @given(own)
 def test_matches_that_agree_and_closeness_add_to_its_support(
-    numbers: dict[str, float],
+    numbers: Evidence,
 ) -> None:
     alone, joined = (
-        {**numbers, "matched": share, "closeness": nats} for share, nats in ((0.0, 0.0), (0.5, -0.4))
+        replace(numbers, matched=share, closeness=nats) for share, nats in ((0.0, 0.0), (0.5, -0.4))
     )
-    assert support(joined) - support(alone) == pytest.approx(beside(0.5, -0.4))
+    assert log_odds(joined) - log_odds(alone) == pytest.approx(beside(0.5, -0.4))
     assert beside(0.0, -0.5) < beside(0.0, -0.1) < 0.0 == beside(0.0) < beside(0.1) < beside(0.2)
 
 
 @given(whole, st.sampled_from([name for name in SPEAKS if name in WHOLE and SPEAKS[name]]), share)
 def test_what_speaks_for_a_pose_never_lowers_its_confidence_nor_does_the_contrary_raise_it(
-    evidence: dict[str, float], name: str, step: float
+    evidence: Evidence, name: str, step: float
 ) -> None:
-    better = {**evidence, name: evidence[name] + SPEAKS[name] * step}
+    better = replace(evidence, **{name: getattr(evidence, name) + SPEAKS[name] * step})
     assert 0.0 < confidence(evidence) <= confidence(better) < 1.0
 
 
 @given(whole)
-def test_two_poses_that_explain_the_data_alike_are_never_ok(evidence: dict[str, float]) -> None:
-    assert confidence({**evidence, "rival_margin": 0.0}) <= 0.5
-    assert word(confidence({**evidence, "rival_margin": -0.8 * NEARLY})) != "ok"
+def test_two_poses_that_explain_the_data_alike_are_never_ok(evidence: Evidence) -> None:
+    assert confidence(replace(evidence, rival_margin=0.0)) <= 0.5
+    assert word(confidence(replace(evidence, rival_margin=-0.8 * NEARLY))) != "ok"
 
 
 @given(whole)
-def test_no_pose_that_turns_the_world_over_or_fits_at_another_size_is_ok(evidence: dict[str, float]) -> None:
-    assert word(confidence({**evidence, "overturned": 1.0})) == "failed"
-    assert word(confidence({**evidence, "size_gain": 0.3})) != "ok"
+def test_no_pose_that_turns_the_world_over_or_fits_at_another_size_is_ok(evidence: Evidence) -> None:
+    assert word(confidence(replace(evidence, overturned=1.0))) == "failed"
+    assert word(confidence(replace(evidence, size_gain=0.3))) != "ok"
 
 
-@given(log_odds, st.floats(NO_RIVAL, 10.0))
-def test_a_pose_is_no_likelier_than_against_its_rival_alone(log_odds: float, margin: float) -> None:
-    assert believed(log_odds, margin) <= 1.0 / (1.0 + np.exp(margin))
-    assert believed(log_odds, NO_RIVAL) == pytest.approx(1.0 / (1.0 + np.exp(-log_odds)), abs=1e-6)
+@given(odds, st.floats(NO_RIVAL, 10.0))
+def test_a_pose_is_no_likelier_than_against_its_rival_alone(odds: float, margin: float) -> None:
+    assert believed(odds, margin) <= 1.0 / (1.0 + np.exp(margin))
+    assert believed(odds, NO_RIVAL) == pytest.approx(1.0 / (1.0 + np.exp(-odds)), abs=1e-6)
 
 
 def test_the_trees_are_those_of_scikit_learn() -> None:
@@ -146,12 +150,15 @@ def test_words(probability: float, expected: str) -> None:
 
 
 @given(whole)
-def test_a_pair_turned_round_has_the_same_support_and_confidence(evidence: dict[str, float]) -> None:
+def test_a_pair_turned_round_has_the_same_support_and_confidence(evidence: Evidence) -> None:
     there = {"source": "target", "target": "source"}
-    ends = {name: name.rpartition("_") for name in evidence}
-    round_about = {
-        f"{stem}_{there[end]}" if end in there else name: evidence[name]
-        for name, (stem, _, end) in ends.items()
-    }
-    assert support(round_about) == support(evidence)
+    facts = evidence.as_dict()
+    ends = {name: name.rpartition("_") for name in facts}
+    round_about = Evidence(
+        **{
+            f"{stem}_{there[end]}" if end in there else name: facts[name]
+            for name, (stem, _, end) in ends.items()
+        }
+    )
+    assert log_odds(round_about) == log_odds(evidence)
     assert features(round_about) == features(evidence)

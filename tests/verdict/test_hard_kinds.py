@@ -11,9 +11,10 @@ from made_places import Made
 
 from hybridreg.candidates import input_mistakes
 from hybridreg.classical.voxel import VoxelGrid
-from hybridreg.evidence import support, views
+from hybridreg.evidence import views
+from hybridreg.evidence.agreement import compare
 from hybridreg.evidence.orientation import overturned
-from hybridreg.evidence.scale import size
+from hybridreg.evidence.pose_evidence import PoseEvidence
 from hybridreg.geometry import se3
 from hybridreg.matches import Correspondences, Pose
 from hybridreg.pair import Pair
@@ -40,7 +41,7 @@ def about_middle(made: Made, factor: float) -> np.ndarray:
 
 
 def test_a_pose_that_turns_the_world_over_is_failed(crossing: Made) -> None:
-    source, target = views.of(crossing.scene)
+    source, target = views.of(crossing.scene).source, views.of(crossing.scene).target
     assert not overturned(source, target, crossing.truth)
     over = se3.from_rt(se3.rotation_about(np.array([np.pi, 0.0, 0.0])), np.array([0.0, 0.0, -3.6]))
     assert overturned(source, target, over @ crossing.truth)
@@ -51,13 +52,13 @@ def test_a_pose_that_turns_the_world_over_is_failed(crossing: Made) -> None:
 
 def test_a_pose_that_puts_a_sensor_under_the_ground_is_failed(crossing: Made) -> None:
     sunk = se3.from_rt(np.eye(3), np.array([0.0, 0.0, -5.0])) @ crossing.truth
-    assert overturned(*views.of(crossing.scene), sunk)
+    assert overturned(views.of(crossing.scene).source, views.of(crossing.scene).target, sunk)
 
 
 def test_where_gravity_is_unknown_nothing_is_turned_over(crossing: Made) -> None:
     scene = VoxelGrid()(replace(crossing.scene.pair, gravity="unknown"))
     over = se3.from_rt(se3.rotation_about(np.array([np.pi, 0.0, 0.0])), np.array([0.0, 0.0, -3.6]))
-    assert not overturned(*views.of(scene), over @ crossing.truth)
+    assert not overturned(views.of(scene).source, views.of(scene).target, over @ crossing.truth)
     with pytest.raises(ValueError, match="gravity"):
         Pair.of(np.eye(3), np.eye(3), gravity="down")
 
@@ -66,7 +67,7 @@ def test_where_gravity_is_unknown_nothing_is_turned_over(crossing: Made) -> None
 def test_a_source_of_another_size_is_never_ok_and_its_size_is_told(crossing: Made, factor: float) -> None:
     scene = VoxelGrid()(changed(crossing, factor))
     pose = Pose(about_middle(crossing, factor))
-    scale, gain = size(scene, pose.T)
+    scale, gain = PoseEvidence(views.of(scene), pose.T).size
     assert scale == pytest.approx(1.0 / factor, abs=0.01)
     assert gain > 0.2
     judgement = judge(scene, pose, NONE)
@@ -77,7 +78,7 @@ def test_a_source_of_another_size_is_never_ok_and_its_size_is_told(crossing: Mad
 @pytest.mark.parametrize("place", ["crossing", "fan"])
 def test_the_right_size_is_not_doubted(place: str, request: pytest.FixtureRequest) -> None:
     made: Made = request.getfixturevalue(place)
-    assert size(made.scene, made.truth).gain < 0.2
+    assert PoseEvidence(views.of(made.scene), made.truth).size.gain < 0.2
 
 
 def test_a_map_that_holds_a_place_twice_shows_its_other_copy(crossing: Made) -> None:
@@ -85,9 +86,8 @@ def test_a_map_that_holds_a_place_twice_shows_its_other_copy(crossing: Made) -> 
     copy = se3.from_rt(se3.rotation_about(np.array([0.0, 0.0, np.radians(1.5)])), np.array([2.5, 0.4, 0.0]))
     twice = np.vstack([pair.target.points, se3.apply(copy, pair.target.points)])
     scene = VoxelGrid()(Pair.of(pair.source.points, twice))
-    found = copies(
-        *views.of(scene), crossing.truth, support.seen(scene, crossing.truth)[0].axes, views.spacing(scene)
-    )
+    both = views.of(scene)
+    found = copies(both, crossing.truth, compare(both, crossing.truth).axes)
     off = [se3.inverse(copy @ crossing.truth) @ T for T in found]
     assert min(np.linalg.norm(T[:3, 3]) for T in off) < 1.0
     judgement = judge(scene, Pose(crossing.truth), NONE)

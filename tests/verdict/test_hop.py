@@ -7,7 +7,7 @@ import pytest
 from hybridreg.classical.voxel import VoxelGrid
 from hybridreg.cloud import PointCloud
 from hybridreg.data.hard import box_world
-from hybridreg.evidence import support, views
+from hybridreg.evidence import log_odds, views
 from hybridreg.evidence.surface_distance import closeness
 from hybridreg.geometry import se3
 from hybridreg.pair import Pair
@@ -35,8 +35,7 @@ def wrong_by(T: np.ndarray, truth: np.ndarray) -> tuple[float, float]:
 
 def started(scene: Scene, truth: np.ndarray) -> np.ndarray:
     # So far off along the street that settling comes to rest on the way.
-    source, target = views.of(scene)
-    return settle(source, target, se3.from_rt(np.eye(3), [2.4, 0.6, 0.0]) @ truth, views.spacing(scene))
+    return settle(views.of(scene), se3.from_rt(np.eye(3), [2.4, 0.6, 0.0]) @ truth)
 
 
 def test_a_pose_that_rests_beside_the_right_one_leaves_for_it(street: tuple[Scene, np.ndarray]) -> None:
@@ -50,16 +49,15 @@ def test_a_pose_that_rests_beside_the_right_one_leaves_for_it(street: tuple[Scen
 
 def test_support_and_closeness_are_no_less_than_before(street: tuple[Scene, np.ndarray]) -> None:
     scene, truth = street
-    source, target = views.of(scene)
+    both = views.of(scene)
     start = started(scene, truth)
     (end,) = hop(scene, start[None], np.random.default_rng(1))
     before, after = (
-        support.of(source, target, T, views.spacing(scene), every=3)
-        + support.beside(0.0, closeness(scene, T, 4))
+        log_odds.of(both, T, stride=3) + log_odds.beside(0.0, closeness(both.fine, T, 4))
         for T in (start, end.T)
     )
     assert after >= before
-    assert end.by_surfaces == support.of(source, target, end.T, views.spacing(scene))
+    assert end.by_surfaces == log_odds.of(both, end.T)
 
 
 def test_the_generator_decides_it(street: tuple[Scene, np.ndarray]) -> None:

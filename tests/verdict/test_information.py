@@ -13,8 +13,8 @@ from hybridreg.search.settle import settle
 
 
 def held(made: Made) -> Information:
-    source, target = views.of(made.scene)
-    return information.measure(compare(views.of(made.scene), made.truth), target)
+    both = views.of(made.scene)
+    return information.measure(compare(both, made.truth), both.target)
 
 
 def test_a_corridor_is_open_along_itself(corridor: Made) -> None:
@@ -30,8 +30,9 @@ def test_a_crossing_is_held_in_every_direction(crossing: Made) -> None:
 
 
 def test_the_matrix_is_the_second_derivative_of_the_squared_plane_distances(crossing: Made) -> None:
-    source, target = views.of(crossing.scene)
-    agreement = compare(views.of(crossing.scene), crossing.truth)
+    both = views.of(crossing.scene)
+    target = both.target
+    agreement = compare(both, crossing.truth)
     found = information.measure(agreement, target)
     way = agreement.source
     points = way.moved[way.agrees]
@@ -50,23 +51,21 @@ def test_the_matrix_is_the_second_derivative_of_the_squared_plane_distances(cros
 
 
 def test_no_agreeing_point_gives_no_information(crossing: Made) -> None:
-    source, target = views.of(crossing.scene)
+    both = views.of(crossing.scene)
     far = se3.from_rt(np.eye(3), np.array([0.0, 0.0, 5000.0]))
-    found = information.measure(compare(views.of(crossing.scene), far), target)
+    found = information.measure(compare(both, far), both.target)
     assert not found.matrix.any()
     assert found.weakest == 0.0
 
 
 @pytest.mark.parametrize("offset", [(0.6, 0.4, 0.2), (-0.5, 0.5, -0.3)])
 def test_settling_finds_the_true_pose_again(crossing: Made, offset: tuple[float, float, float]) -> None:
-    source, target = views.of(crossing.scene)
     start = se3.from_rt(se3.yaw(2.0)[:3, :3], np.array(offset)) @ crossing.truth
-    found = settle(source, target, start, views.spacing(crossing.scene))
+    found = settle(views.of(crossing.scene), start)
     assert np.linalg.norm((found - crossing.truth)[:3, 3]) < 0.15
     assert se3.angle_deg(found[:3, :3] @ crossing.truth[:3, :3].T) < 0.5
 
 
 def test_settling_leaves_a_pose_without_overlap_alone(crossing: Made) -> None:
-    source, target = views.of(crossing.scene)
     far = se3.from_rt(np.eye(3), np.array([0.0, 0.0, 5000.0]))
-    assert (settle(source, target, far, views.spacing(crossing.scene)) == far).all()
+    assert (settle(views.of(crossing.scene), far) == far).all()

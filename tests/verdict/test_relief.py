@@ -15,7 +15,8 @@ from tests.made_fields import field_pair
 
 def reliefs(**how: float) -> tuple[Relief, Relief, np.ndarray]:
     pair, truth = field_pair(**how)
-    source, target = (view.relief for view in views.of(hr.VoxelGrid()(pair)))
+    both = views.of(hr.VoxelGrid()(pair))
+    source, target = both.source.relief, both.target.relief
     assert source is not None
     assert target is not None
     return source, target, truth

@@ -58,13 +58,13 @@ def test_different_places_are_failed(real_data: Path) -> None:
         pytest.skip("not all pairs are there")
     for i, source in enumerate(PAIRS):
         scene = scene_of(real_data, source, PAIRS[i - 1])
-        both, spacing = views.of(scene), views.spacing(scene)
-        settled = [settle(*both, se3.yaw(float(yaw)), spacing) for yaw in range(0, 360, 120)]
+        both = views.of(scene)
+        settled = [settle(both, se3.yaw(float(yaw))) for yaw in range(0, 360, 120)]
         covered = [np.isfinite(_gaps(scene, T)).mean() for T in settled]
         judgement = judge(scene, Pose(settled[int(np.argmax(covered))]), Correspondences.none())
         assert judgement.verdict == "failed", (source, judgement.reasons)
 
 
 def _gaps(scene: Scene, T: np.ndarray) -> np.ndarray:
-    source, target = views.of(scene)
+    source, target = views.of(scene).source, views.of(scene).target
     return target.tree.query(se3.apply(T, source.points), distance_upper_bound=0.5)[0]
