@@ -4,13 +4,22 @@
 from __future__ import annotations
 
 import os
+import re
 import secrets
 import shutil
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from hybridreg.io.faults import naming
+
+try:
+    import fcntl
+except ImportError:  # Windows
+    fcntl = None  # type: ignore[assignment]
+
+# What `atomic_path` calls the files that it gives.
+_TEMPORARY = re.compile(r"\.[0-9a-f]{16}(\.[^.]*)?")
 
 
 @contextmanager
@@ -44,8 +53,7 @@ def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
     """
     target = _writable_target(path)
     temporary = target.with_name(f".{secrets.token_hex(8)}{target.suffix}")
-    with naming(path, instead_of=temporary):
-        _make(temporary)
+    with naming(path, instead_of=temporary), _made(temporary):
         try:
             yield temporary
             if target.exists():
@@ -83,9 +91,46 @@ def _writable_target(path: str | os.PathLike[str]) -> Path:
     return target
 
 
-def _make(temporary: Path) -> None:
-    # Not tempfile: its files are readable by their owner alone, whatever the umask says.
-    os.close(os.open(temporary, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666))
+def sweep(folder: str | os.PathLike[str]) -> None:
+    """Remove what killed processes were writing in a folder: temporary files of `atomic_path` that nobody holds.
+
+    Where the system or the file system knows no locks, nothing is removed.
+    """
+    for path in Path(folder).glob(".*"):
+        if _TEMPORARY.fullmatch(path.name) and path.is_file():
+            with suppress(OSError), path.open("rb") as file:
+                if _locked(file.fileno()):
+                    path.unlink(missing_ok=True)
+
+
+@contextmanager
+def _made(temporary: Path) -> Iterator[None]:
+    # Held until it has taken its place, so that `sweep` leaves it alone. Not tempfile: its files are readable by their
+    # owner alone, whatever the umask says.
+    while True:
+        handle = os.open(temporary, os.O_CREAT | os.O_RDWR, 0o666)
+        _locked(handle)
+        if temporary.exists():  # else swept before it was held
+            break
+        os.close(handle)
+    if fcntl is None:  # and no file that is open can be renamed
+        os.close(handle)
+        yield
+        return
+    try:
+        yield
+    finally:
+        os.close(handle)
+
+
+def _locked(handle: int) -> bool:
+    if fcntl is None:
+        return False
+    try:
+        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        return False
+    return True
 
 
 def _flush_to_disk(path: Path) -> None:

@@ -10,6 +10,7 @@ import weakref
 from contextlib import suppress
 from pathlib import Path
 
+from hybridreg.io import atomic
 from hybridreg.io.faults import naming
 from hybridreg.io.owner import Owner
 
@@ -26,7 +27,7 @@ class InUse(ValueError):
 
 
 class Lock:
-    """Holds the file `path` within a `with` block.
+    """Holds the file `path` within a `with` block; what a killed writer left half written beside it is removed.
 
     The system's own lock (flock) lies on the file, so that it ends with a killed owner. Where the file system knows
     no locks, that the file is there is the lock: that of a process of this host that is gone is taken over, one of
@@ -53,6 +54,7 @@ class Lock:
         with naming(self.what, instead_of=self.path):
             self._handle = self._taken()
         _HELD.add(self)
+        atomic.sweep(self.path.parent)
         return self
 
     def __exit__(self, *_: object) -> None:

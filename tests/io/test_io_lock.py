@@ -155,3 +155,34 @@ def test_a_folder_that_is_not_there_is_named(tmp_path: Path) -> None:
     with pytest.raises(FileNotFoundError) as told, folder_lock(tmp_path / "none"):
         pytest.fail("locked nothing")
     assert told.value.filename == str(tmp_path / "none")
+
+
+_WRITES = """
+import os, signal, sys
+from hybridreg.io.atomic import atomic_path
+with atomic_path(sys.argv[1]) as temporary:
+    temporary.write_text("half")
+    if sys.argv[2] == "killed":
+        os.kill(os.getpid(), signal.SIGKILL)
+    print("writing", flush=True)
+    sys.stdin.read()
+"""
+
+
+@pytest.mark.skipif(os.name != "posix", reason="signals and flock")
+def test_what_a_killed_writer_left_is_swept_and_what_is_being_written_stays(tmp_path: Path) -> None:
+    command = [sys.executable, "-c", _WRITES, str(tmp_path / "report.html")]
+    subprocess.run([*command, "killed"], check=False)
+    (left,) = tmp_path.glob(".*.html")
+    mine = tmp_path / ".gitignore"
+    mine.write_text("runs")
+    with subprocess.Popen(
+        [*command, "goes on"], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    ) as writer:
+        assert writer.stdout is not None
+        assert writer.stdout.readline() == "writing\n"
+        with folder_lock(tmp_path):
+            assert not left.exists()
+        writer.communicate("")
+    assert (tmp_path / "report.html").read_text() == "half"
+    assert sorted(path.name for path in tmp_path.iterdir()) == [".gitignore", "report.html"]

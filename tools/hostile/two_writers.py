@@ -64,8 +64,6 @@ def run_two(root: Path, out: str, *, rounds: int, workers: int, seed: int) -> Me
         wrote = [process.returncode != 2 for process in pair]
         assert sum(wrote) == 1 or 0 in [process.returncode for process in pair], "both wrote, or neither"
         killed.compare(before, killed.whole_lines(folder))
-    for half_written in (root / out).glob(".*.*"):  # the report that a killed batch was at
-        half_written.unlink()
     killed.run_whole(root, out, workers)
     return met
 
