@@ -44,7 +44,7 @@ def register(
         Where each sensor stood, in the coordinates of its points; see `PointCloud.of`. Say it for maps, merged clouds
         and vehicle frames: it lets free space speak.
     gravity : "known" or "unknown"
-        "unknown" where one cloud may be turned over; else a pose that turns the world over is never "ok".
+        "unknown" where one cloud may be turned over; else a pose that turns the world upside down is never "ok".
 
     Returns
     -------

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Pose from above: both clouds levelled by their ground, laid on one another at every yaw and shift."""
+"""Pose by correlation from above: both clouds levelled by their ground, at every yaw and shift."""
 
 from __future__ import annotations
 
@@ -26,41 +26,46 @@ from hybridreg.stage import Stage
 
 Array = NDArray[np.float64]
 
-# In voxels: the coarse map's cell, how far from the sensor points are used. Two such clouds fit in the largest map.
-_COARSE, _REACH = 3.0, 175.0
-# Degrees between yaws; the share of the best peak's score that a peak needs: along a corridor the walls outvote what
-# tells one place from another.
-_YAW_STEP_DEG, _SHARE = 4.0, 0.5
-# How far the spectra are levelled: at first by half, so that the few things on a field are heard beside a wall or a
-# wood, and not at all when no pose is plain then; and in the second look.
-_LEVELLED, _WHITEN = (0.5, 0.0), (0.0, 0.75)
-# Peaks looked at first; the others are not where one of these is beyond doubt.
+# Cell of the coarse map, voxels; by hand.
+_COARSE = 3.0
+# Farthest points from the sensor that are used, voxels: two such clouds fit in the largest map.
+_REACH = 175.0
+# Degrees between yaws; by hand.
+_YAW_STEP_DEG = 4.0
+# Share of the best peak's score that a peak needs: the walls of a corridor outvote what tells places apart; by hand.
+_SHARE = 0.5
+# Exponents by which the spectra are whitened: at first by half, so that the few objects on a field count beside a wall
+# or a wood, and not at all when no pose stands out then; by hand.
+_LEVELLED = (0.5, 0.0)
+# The same in the second look; by hand.
+_WHITEN = (0.0, 0.75)
+# Peaks examined first; the others only where none of these is beyond doubt; by hand.
 _FIRST = 10
 # Log-odds of the best pose of the run below which no other spectrum finds the right one: of the pairs of `sim:val` and
 # `sim:train` that another spectrum solved, the best pose before had -3.3 at least.
 _LOST = -5.0
-# Degrees: a sensor whose ground leans so much hangs on its head.
+# Degrees of tilt from which a sensor is upside down; by hand.
 _UPTURNED_DEG = 140.0
 
 
 @dataclass(frozen=True, kw_only=True)
 class BirdsEye(Stage):
-    """Search all yaws and shifts on the ground, for sensors whose tilt the ground tells.
+    """Search all yaws and shifts on the ground, for sensors whose tilt follows from the ground.
 
-    Both clouds are levelled by their ground (`hybridreg.geometry.ground`) and seen from above in layers of height.
-    Columns with points count for a pose where they meet, columns that one sensor looked through and the other
-    filled count a little against it. The correlation is computed by FFT for every yaw on a coarse grid, its best
-    peaks are improved on a fine one, and the best of these are settled on the surfaces and ranked by the verdict's
-    support. The height follows from the two ground planes. The others come back as `rivals`.
+    Both clouds are levelled by their ground (`hybridreg.geometry.ground`) and projected from above in layers of
+    height. Columns occupied in both count for a pose, columns that are free space in one and occupied in the other
+    count a little against it. The correlation is computed by FFT for every yaw on a coarse grid, its best peaks are
+    improved on a fine one, and the best of these are settled on the surfaces and ranked by their log-odds. The height
+    follows from the two ground planes. The others are returned as `rivals`.
 
-    Where a cloud shows no ground, its sensor is taken to stand upright (or on its head, if the other one does) and
+    Where a cloud shows no ground, its sensor is assumed to stand upright (or upside down, if the other one does) and
     its lowest points to be the ground; a note says so.
 
     Parameters
     ----------
     vertical : "ground" or "sensor"
-        What levels the clouds: the ground that each shows, in whatever way its sensor hung; or the z axes of both
-        sensors, for those that stand upright and show a wall or a ceiling, or a ground that is askew.
+        What levels the clouds: the ground that each shows, however its sensor was mounted; or the z axes of both
+        sensors, for those that stand upright and show a wall, a ceiling or sloping ground.
     voxel : float or None
         Resolution, metres; None takes 0.5, less where the clouds reach less than 30 m.
     layers : tuple of float
@@ -70,7 +75,7 @@ class BirdsEye(Stage):
     tries : int
         Poses settled and ranked, at most.
     again : bool
-        Look a second and a third time, with other spectra, where no pose is plain at first.
+        Search a second and a third time, with other spectra, where no pose stands out at first.
     """
 
     vertical: Literal["ground", "sensor"] = "ground"
@@ -98,12 +103,12 @@ class BirdsEye(Stage):
         frames = _by_ground(own, scene) if self.vertical == "ground" else _by_sensor(own)
         found = self._laid(scene, own, frames, voxel)
         if not found:
-            scene.note("bird's-eye search: nothing stands on the ground")
+            scene.note("bird's-eye search: nothing but ground")
             return Pose.unknown()
         return as_pose(distinct(scene, found))
 
     def _laid(self, scene: Scene, own: Scene, frames: Sequence[Array], voxel: float) -> list[Hypothesis]:
-        # The best poses where each cloud is levelled by one frame (T_level_source, T_level_target).
+        # The best poses with each cloud levelled by one frame (T_level_source, T_level_target).
         T_level_source, T_level_target = frames
         source, target = (self._view(own, s, T, voxel) for s, T in zip(_SIDES, frames, strict=True))
         if len(source.filled.layer) == 0 or len(target.filled.layer) == 0:
@@ -122,7 +127,7 @@ class BirdsEye(Stage):
                 return found
         if not found or not self.again:
             return found
-        # Levelled by the best pose, both clouds lie truer than by their grounds.
+        # The best pose levels the clouds better than their grounds do.
         T_level_source = _centred(T_level_target @ found[0].T, own.source.centre)
         again = self._slid(self._view(own, "source", T_level_source, voxel), target, voxel)
         return found + best_first(scene, [T_target_level @ M @ T_level_source for M in again])
@@ -192,8 +197,8 @@ def _by_ground(own: Scene, scene: Scene) -> list[Array]:
             head_down = known is not None and known.up[2] < np.cos(np.radians(_UPTURNED_DEG))
             shown = _assumed(level.points, -1.0 if head_down else 1.0)
             scene.note(
-                f"bird's-eye search: no ground found in the {side}; its sensor is taken to "
-                f"{'hang on its head, as the other does' if head_down else 'stand upright'}"
+                f"bird's-eye search: no ground found in the {side}; its sensor is assumed to be "
+                f"{'upside down, as the other is' if head_down else 'upright'}"
             )
         frames.append(_level_frame(shown, level))
     return frames

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Pose from the relief of the ground: where do the hollows of one field lie on those of another?"""
+"""Pose by correlation of the ground relief of both clouds."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, kw_only=True)
 class ReliefSearch(Stage):
-    """Search all yaws and shifts for the one that lays hollows on hollows and heights on heights.
+    """Search all yaws and shifts for the best correlation of the ground relief.
 
-    Each cloud's ground (`hybridreg.geometry.ground_relief`) is a map with gaps; maps are laid on one another by
-    correlation at every yaw and shift (`hybridreg.classical.overhead.relief_sweep`), the best as they lie and settled
-    on the surfaces, and ranked by the verdict's support. For open ground, where little else holds a pose; without
-    ground in both clouds, no pose.
+    Each cloud's relief (`hybridreg.geometry.ground_relief`) is a height map with gaps; the maps are correlated at every
+    yaw and shift (`hybridreg.classical.overhead.relief_sweep`), and the best poses ranked by their log-odds, as they
+    are and settled on the surfaces. For open ground, where little else constrains a pose; without ground in both clouds
+    no pose is found.
 
     Parameters
     ----------

@@ -24,9 +24,9 @@ Array = NDArray[np.float64]
 
 # Metres of one unit, and its name.
 _UNITS = ((0.001, "millimetres"), (0.01, "centimetres"), (0.3048, "feet"))
-# Poses that are tried under a mistake: the right one is among the first where the clouds fit well.
+# Poses that are tried under a mistake: the right one is among the first where the clouds fit well; by hand.
 _TRIES = 10
-# Reaches of two clouds of one place, in one unit, differ by less than this factor more often than not.
+# Extents of two clouds of one place, in one unit, mostly differ by less than this factor; by hand.
 _ALIKE = 4.0
 
 

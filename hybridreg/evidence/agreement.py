@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""What two clouds say about one pose: where both sensors looked, did they see the same surfaces?
+"""Where both sensors looked, did they see the same surfaces? Visibility, free space and agreement under one pose.
 
-A share of all points is a poor judge. Points that the other sensor could not see lower it for a right pose, and the
-ground raises it for a wrong one. So only points that the other sensor looked at are counted, and they are counted
-apart for three directions of normals: the ground holds the height, the walls along a street hold it across, and the
-few surfaces that face along the street decide whether the clouds may slide.
+A share of all points is a poor score. Points that the other sensor could not see lower it for a right pose, and the
+ground raises it for a wrong one. So only points visible to the other sensor are counted, and they are counted
+separately for three directions of normals: the ground constrains the height, the walls along a street the motion
+across it, and the few surfaces that face along the street decide whether the clouds may slide.
 """
 
 from __future__ import annotations
@@ -25,24 +25,30 @@ from hybridreg.runtime.cores import query_threads
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-# In units of the evidence's spacing: how near a point must come to count as covered (in space) and as agreeing
-# (across the other surface), how far two ranges of one surface may differ, and how far a surface reaches sideways.
-_COVERED, _ACROSS, _MARGIN, _REACH = 2.0, 0.5, 1.0, 1.0
-# Normals of one surface estimated twice, from different sensors' samples, seldom differ by more than 45 degrees.
+# Spacings within which a point counts as covered by the other cloud; by hand.
+_COVERED = 2.0
+# Spacings off the other surface's plane within which it agrees; by hand.
+_ACROSS = 0.5
+# Spacings by which two ranges of one surface may differ; by hand.
+_MARGIN = 1.0
+# Spacings that a surface extends to the side of its points; by hand.
+_REACH = 1.0
+# Cosine between two normals of one surface: estimated from different sensors' samples, they seldom differ by more than
+# 45 degrees.
 _SAME_NORMAL = float(np.cos(np.radians(45.0)))
-# Points looked at for nothing, added to every count: so few agreeing points are a coincidence.
+# Points added to every count of visible ones: so few agreeing points are a coincidence; by hand.
 FEW = 20.0
-# Without a range image a point counts as looked at where the other cloud has anything within so many spacings.
+# Without a range image a point counts as visible where the other cloud has any point within so many spacings; by hand.
 _SURROUNDED = 6.0
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class OneWay:
-    """The asked points of one cloud, laid on the other.
+    """The sampled points of one cloud in the frame of the other.
 
-    looked : (m,) bool, the other sensor looked at the place or through it
-    free : (m,) bool, it looked through
-    hidden : (m,) bool, something stood before it
+    looked : (m,) bool, visible: the other sensor measured this place or beyond it
+    free : (m,) bool, it measured beyond: the point violates free space
+    hidden : (m,) bool, occluded: it measured something nearer
     covered : (m,) bool, the other cloud has a point near by
     agrees : (m,) bool, covered, on the same surface, with the same normal
     match : (m,) int64, row of the nearest point of the other cloud where covered, else -1
@@ -68,12 +74,12 @@ class Agreement:
     """Both clouds under one pose.
 
     axes : (3, 3) float64, rows: main directions of the normals in the target's frame, the commonest first
-    looked, agreed, through : (3,) float64, points that face each axis: looked at by the other sensor, agreeing, and
-        looked through; both clouds together
+    looked, agreed, through : (3,) float64, points that face each axis: visible to the other sensor, agreeing, and
+        violating free space; both clouds together
     relief : Alike
-        Whether the ground rises and falls alike.
+        How well the ground relief of both clouds correlates.
     overturned : bool
-        The world is turned over, or a sensor stands under the other's ground.
+        The world is upside down, or a sensor stands below the other's ground.
     """
 
     source: OneWay
@@ -87,18 +93,18 @@ class Agreement:
 
     @property
     def shares(self) -> Array:
-        """Agreeing share (3,) of the points looked at, for each axis; few points count for little."""
+        """Agreeing share (3,) of the visible points, for each axis; few points count for little."""
         return self.agreed / (self.looked + FEW)
 
     @property
     def looked_through(self) -> float:
-        """Share of the points looked at that a sensor looked through."""
+        """Share of the visible points that violate free space."""
         return float(self.through.sum() / (self.looked.sum() + FEW))
 
     @property
     def rare(self) -> tuple[float, float, float]:
-        """Points looked at, agreeing and looked through that do not face the commonest way: on a field, all but the
-        ground."""
+        """Points visible, agreeing and violating free space that do not face the commonest axis: on a field, all but
+        the ground."""
         return float(self.looked[1:].sum()), float(self.agreed[1:].sum()), float(self.through[1:].sum())
 
 
@@ -140,7 +146,7 @@ def compare_each(views: Views, poses: Array, stride: int = 1) -> list[Agreement]
 
 
 def one_way(a: View, rows: NDArray[np.int64], b: View, T_b_a: Array, spacing: float) -> OneWay:
-    """Lay some rows (m,) of `a` on `b`, under each of some poses (b, 4, 4); the fields have a row for each pose."""
+    """Rows (m,) of `a` in the frame of `b`, under each of some poses (b, 4, 4); the fields have a row for each pose."""
     moved = se3.apply(T_b_a, a.points[rows])
     normals = a.normals[rows] @ np.swapaxes(T_b_a[:, :3, :3], 1, 2)
     limit = _COVERED if b.image is not None else _SURROUNDED

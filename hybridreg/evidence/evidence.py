@@ -43,7 +43,7 @@ class Evidence:
     recipes: float  # entries that found the pose independently of one another
     matched: float  # largest agreeing share of any matcher's matches; 0 where none ran
     closeness: float  # nats per point by which a rival's points lie closer to the surfaces; at most 0
-    overturned: float  # 1 where the pose turns the world over or puts a sensor underground, else 0
+    overturned: float  # 1 where the pose turns the world upside down or puts a sensor underground, else 0
 
     support: float = 0.0  # log-odds that the pose is right, were there no other
     rival_margin: float = NO_RIVAL  # log-odds of the best rival less the pose's

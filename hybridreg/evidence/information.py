@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""How firmly the surfaces hold the pose, and in which direction they do not."""
+"""How well the surfaces constrain the pose, and along which motion they do not (degeneracy)."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class Information:
         Mean of those points: the centre of the overlap.
     weakest : float in [0, 1/3]
         Smallest eigenvalue per point, rotations measured in metres at the overlap's radius. A third is the most
-        that three directions can share evenly; zero is a direction that nothing holds.
+        that three directions can share evenly; zero is an unconstrained motion.
     turns : bool
         Whether the weakest motion is a rotation rather than a translation.
     direction : (3,) float64, unit
@@ -43,7 +43,7 @@ class Information:
 
     @property
     def words(self) -> str:
-        """The weak motion as a phrase: `along x of the target (0.98 0.17 0.00)`."""
+        """The poorly constrained motion as a phrase: `along x of the target (0.98 0.17 0.00)`."""
         axis = int(np.argmax(np.abs(self.direction)))
         numbers = " ".join(f"{x:.2f}" for x in self.direction * np.sign(self.direction[axis]))
         return f"{'a turn about' if self.turns else 'along'} {'xyz'[axis]} of the target ({numbers})"

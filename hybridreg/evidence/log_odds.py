@@ -27,7 +27,7 @@ NEARLY = float(np.log(OK / (1.0 - OK)))
 _UNHELD = 1e-4
 # A share below this is as good as none: by hand.
 _NOTHING = 0.02
-# Log-odds that a pose loses which turns the world over: by hand, as no other evidence makes up for it.
+# Log-odds that a pose loses which turns the world upside down: by hand, as no other evidence makes up for it.
 _OVERTURNED = 20.0
 # Nats of the relief beyond which it is certain anyway: by hand.
 _MOST_NATS = 1000.0

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What the run's matchers say about a pose: surfaces that look alike should lie on one another."""
+"""How many of the run's feature matches agree with a pose."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from hybridreg.scene import Scene
 
 Array = NDArray[np.float64]
 
-# Spacings within which a match agrees with a pose.
+# Spacings within which a match agrees with a pose; by hand.
 _NEAR = 2.0
 
 
@@ -23,12 +23,12 @@ def agreeing(scene: Scene, matches: Correspondences, T: Array) -> int:
 
 
 def share(scene: Scene, T: Array) -> float:
-    """Agreeing share of the matches of that matcher of which most agree; 0 where none ran."""
+    """Largest agreeing share of any matcher's matches; 0 where none ran."""
     return max((_share_of(scene, found, T) for found in scene.matches), default=0.0)
 
 
 def of_most(scene: Scene, T: Array) -> Correspondences:
-    """Those matches of the run of which the largest share agrees with the pose; none where no matcher ran."""
+    """The matches of the matcher with the largest agreeing share; none where no matcher ran."""
     if not scene.matches:
         return Correspondences.none()
     return max(scene.matches, key=lambda found: _share_of(scene, found, T))

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""A pose must not turn the world over, nor put a sensor under the ground.
+"""A pose must not turn the world upside down, nor put a sensor below the ground.
 
-Surfaces alone do not tell: a street laid on a street upside down agrees by the whole of its ground, and what stands on
-it comes to lie where no sensor looked.
+Surfaces alone do not show it: with a street upside down on another the whole ground agrees, and everything on it lies
+where no sensor looked.
 """
 
 from __future__ import annotations
@@ -15,16 +15,21 @@ from hybridreg.geometry import se3
 
 Array = NDArray[np.float64]
 
-# Grounds whose upper sides face apart so far are turned over; whose upper sides face alike so far can be compared.
-_APART, _ALIKE = -0.5, 0.5
-# How far one ground may lie from the other's plane, as it rises and falls: thicknesses of the ground, and more for each
-# metre away.
-_THICK, _SLOPE = 3.0, 0.15
+# Cosine between the upward normals of two grounds below which one is upside down; by hand.
+_APART = -0.5
+# Cosine above which both face up; by hand.
+_ALIKE = 0.5
+# How far one ground may lie from the other's plane, as it rises and falls: in thicknesses of the ground; by hand.
+_THICK = 3.0
+# Metres more for each metre of distance; by hand.
+_SLOPE = 0.15
 
 
 def overturned(source: View, target: View, T_target_source: Array) -> bool:
-    """Whether a pose (4, 4) lays one ground on the underside of the other, or puts a sensor well under the other's
-    ground; False where the clouds do not tell, or gravity is not known."""
+    """Whether a pose (4, 4) puts one ground upside down on the other, or a sensor well below the other's ground.
+
+    False where the clouds do not show it, or gravity is not known.
+    """
     return _under(source, target, T_target_source) or _under(target, source, se3.inverse(T_target_source))
 
 

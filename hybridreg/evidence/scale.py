@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Does the source fit better at another size? A wrong unit, a bad calibration or a stretched map has no right pose."""
+"""Does the source fit better at another scale? With a wrong unit or a stretched map no rigid pose is right."""
 
 from __future__ import annotations
 
@@ -14,13 +14,19 @@ from hybridreg.geometry.point_to_plane import descend
 
 Array = NDArray[np.float64]
 
-# Search distances of the steps: spacings of the evidence, then shares of the fine surfaces' farthest partner; points.
-_ROUGHLY, _CLOSELY, _POINTS = (8.0, 5.0, 4.0, 3.0, 2.0, 2.0), (1.0, 0.6, 0.4), 700
-# Width of the weights per search distance.
+# Farthest partners of the rough steps, spacings; by hand.
+_ROUGHLY = (8.0, 5.0, 4.0, 3.0, 2.0, 2.0)
+# Farthest partners of the fine steps, shares of the fine surfaces' own; by hand.
+_CLOSELY = (1.0, 0.6, 0.4)
+# Points that take part; by hand.
+_POINTS = 700
+# Width of the weights per farthest partner; by hand.
 _TRUST = 0.25
-# Sizes beyond this are no small error, and not looked for here; nearer to 1 than this they are noise: of 38 right
-# poses, real and simulated, four differ by more, none of which lies more closely at that size.
-_MOST, _LEAST = 1.25, 0.01
+# Scales beyond this are no small error, and are not looked for here; by hand.
+_MOST = 1.25
+# Scales nearer to 1 than this are noise: of 38 right poses, real and simulated, four differ by more, and none of these
+# lies closer at that scale.
+_LEAST = 0.01
 
 
 class Size(NamedTuple):

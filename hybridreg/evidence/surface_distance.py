@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""How closely the points of one cloud lie on the surfaces of the other, measured against the sensors' noise.
+"""How closely the points of one cloud lie on the surfaces of the other, compared with the sensors' noise.
 
 Along a corridor many poses bring walls onto walls within a surface's tolerance. At the right one the points lie on them
-to a centimetre or two, those on door frames and kerbs too; at a wrong one some centimetres beside. That takes surfaces
-as fine as the clouds show them; their normals are found where a pose asks for them.
+to a centimetre or two, those on door frames and kerbs too; at a wrong one they are some centimetres off. That takes
+surfaces as fine as the clouds show them; normals are estimated where a pose asks for them.
 """
 
 from __future__ import annotations
@@ -25,31 +25,45 @@ from hybridreg.runtime.cores import n_threads
 
 Array = NDArray[np.float64]
 
-# Metres, for clouds that reach 5 m or further; less in proportion for smaller ones, which are scanned from nearer: grid
-# of the surfaces, noise of a range, and farthest partner. A grid has so many cells along an axis at most.
-_CELL, _NOISE, _NEAR, _FROM = 0.02, 0.03, 0.5, 5.0
+# Metres, extent of a cloud from which the lengths below hold; for smaller ones, scanned from nearer, they shrink in
+# proportion; by hand.
+_FROM = 5.0
+# Metres, grid of the surfaces; by hand.
+_CELL = 0.02
+# Metres, standard deviation of a range: that of common LiDARs.
+_NOISE = 0.03
+# Metres, farthest partner of a point; by hand.
+_NEAR = 0.5
+# Cells of the grid along an axis, at most: what its integer keys hold.
 _MOST_CELLS = 2**20
-# Points from which a normal is found; points of a cloud that make surfaces, and that are asked about, at most.
-_NEIGHBOURS, _MOST, _ASKED = 15, 100_000, 1_500
-# Of the steps of settling: farthest partner, of the farthest of all; width of the weights per distance, at least the
-# noise; points.
-_REACHES, _TRUST, _SETTLING = (1.0, 0.7, 0.5, 0.3, 0.2), 0.25, 600
-# Share of the near points that lie anywhere: on what moved, or was seen from one side only.
+# Neighbours that a normal is estimated from; by hand.
+_NEIGHBOURS = 15
+# Points of a cloud that make surfaces, at most: for speed.
+_MOST = 100_000
+# Points that are compared, at most: for speed.
+_ASKED = 1_500
+# Farthest partners of the settling steps, shares of `_NEAR`; by hand.
+_REACHES = (1.0, 0.7, 0.5, 0.3, 0.2)
+# Width of the weights per farthest partner, at least the noise; by hand.
+_TRUST = 0.25
+# Points that settle: for speed.
+_SETTLING = 600
+# Share of the near points that lie on no common surface: on what moved, or was seen from one side only; by hand.
 _ANYWHERE = 0.2
-# Points looked at for nothing, added to every count: so few close points are a coincidence.
+# Points added to every count: so few close points are a coincidence; by hand.
 _FEW = 20.0
 
 
 @dataclass(frozen=True, eq=False)
 class Surfaces:
-    """One cloud, as fine as it is.
+    """One cloud at the finest grid that it supports.
 
     Attributes
     ----------
     points : (n, 3) float64, metres
     tree : KD-tree of the points
     asked : (m, 3) float64
-        Points that are asked about.
+        Points that are compared.
     scale : float
         What the lengths above are multiplied by; 1 outdoors.
     """
@@ -72,7 +86,7 @@ class Surfaces:
         return _NEAR * self.scale
 
     def facing(self, rows: NDArray[np.int64]) -> Array:
-        """Normals (k, 3) of some points, found when they are first asked for: of most points none ever is."""
+        """Normals (k, 3) of some points, estimated when they are first asked for: those of most points never are."""
         new = np.unique(rows[~self._known[rows]])
         if len(new):
             near = self.points[self.tree.query(self.points[new], k=min(_NEIGHBOURS, len(self.points)))[1]]
@@ -98,10 +112,10 @@ class FineSurfaces(NamedTuple):
 
 
 def closeness(fine: FineSurfaces, T_target_source: Array, stride: int = 1) -> float:
-    """Nats per point by which a right pose explains the distances across the surfaces better than chance does.
+    """Nats per point by which the pose explains the distances to the surfaces better than chance does.
 
-    The log-likelihood of the points that have a partner near by, most of which lie on its surface but for noise, over
-    that of points which lie anywhere near; of the two clouds the greater, as sparse rings make poor surfaces.
+    The log-likelihood of points with a partner near by under a mixture (on the surface but for noise, or anywhere near)
+    over that of points anywhere near; the greater of both directions, as sparse rings make poor surfaces.
 
     Parameters
     ----------

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""One cloud as the verdict looks at it: surfaces at a resolution of its own, and what the sensor saw."""
+"""A cloud as the evidence sees it: surfaces at a resolution of its own, range image, ground and its relief."""
 
 from __future__ import annotations
 
@@ -23,11 +23,12 @@ from hybridreg.scene import Scene, Side
 
 Array = NDArray[np.float64]
 
-# The evidence must mean the same whatever voxel the pipeline used, so it has its own; a level that comes near
-# enough is used as it is, with the normals and the tree that other stages already computed.
+# The evidence must mean the same whatever voxel the pipeline used, so it has its own. A level whose spacing differs by
+# less than this factor is used as it is, with the normals and the tree that other stages computed; by hand.
 _NEAR_ENOUGH = 1.5
+# Points of such a level, at most: for speed.
 _MOST_POINTS = 20_000
-# Points that are asked about, spread evenly over the level: a share of 3,000 is good to one percent.
+# Points that are sampled evenly for comparison: a share of 3,000 is good to one percent.
 _N_ASKED = 3_000
 
 
@@ -42,13 +43,13 @@ class View:
     image : RangeImage, RangeImages or None
         None where the sensor's place is not known.
     asked : (m,) int64
-        Rows that are compared with the other cloud.
+        Rows sampled for comparison with the other cloud.
     settling : (k,) int64
-        Rows by which a pose settles: surfaces that face each way equally often, in random order.
+        Rows that settle a pose: surfaces that face each axis equally often, in random order.
     relief : Relief or None
-        Of the ground; None where the cloud shows none.
+        Of the ground; None where the cloud shows no ground.
     ground : Ground or None
-        None where the cloud shows none, or where its upper side tells nothing (gravity is not known).
+        None where the cloud shows none, or where which side is up is unknown (gravity is not known).
     thickness : float
         Metres by which the ground may differ from a plane.
     centre : (3,) float64

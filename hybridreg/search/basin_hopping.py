@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""The best supported of the places near a pose where surfaces let it rest.
+"""Basin hopping: the likeliest of the local minima near a pose.
 
-Where clouds share a wall and a few things, a pose rests at several places some decimetres or degrees apart, and comes
-to the one that lies nearest to where it began; the support tells which of them is right.
+Where clouds share a wall and little else, ICP has several minima some decimetres or degrees apart and ends in the one
+nearest to its start; the log-odds show which of them is right.
 """
 
 from __future__ import annotations
@@ -22,10 +22,15 @@ from hybridreg.search.settle import settle
 
 Array = NDArray[np.float64]
 
-# Hops from each pose, and the standard deviations of one: degrees about each axis; along it, in turn, spacings, which
-# count as so much of a map's cell at least.
-_HOPS, _TURN_DEG, _SHIFTS, _LEAST = 10, 3.0, (1.0, 4.0), 0.3
-# So many-th of the settling points, of the asked points, and of those asked about closely are used.
+# Hops from each pose; by hand.
+_HOPS = 10
+# Standard deviation of a hop about each axis, degrees; by hand.
+_TURN_DEG = 3.0
+# Standard deviations along each axis, taken in turn, spacings; by hand.
+_SHIFTS = (1.0, 4.0)
+# A spacing counts as this share of a map's cell at least; by hand.
+_LEAST = 0.3
+# Strides over the settling points, the sampled points, and those compared closely: for speed.
 _SETTLING, _LOOKING, _CLOSELY = 3, 3, 4
 
 
@@ -53,7 +58,7 @@ def hop(scene: Scene, poses: Array, rng: np.random.Generator) -> list[Hypothesis
 
 
 def _shaken(T: Array, middle: Array, shift: float, rng: np.random.Generator) -> Array:
-    # About the middle of the source, so that a turn leaves it where it is.
+    # Rotated about the centroid of the source, so that a rotation leaves it in place.
     centre = se3.apply(T, middle)[0]
     turn = se3.rotation_about(np.radians(rng.normal(0.0, _TURN_DEG, 3)))
     return se3.about(centre, turn, rng.normal(0.0, shift, 3)) @ T

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""The best supported pose near a pose, found by trying its neighbours.
+"""Pattern search: the likeliest pose near a pose, found by trying its neighbours.
 
-On a field the ground pulls everywhere and the few things that stand on it pull from near by only: surfaces settle half
-a metre or two beside the right pose, where the support has long begun to rise.
+On a field the ground attracts ICP everywhere and the few objects on it only from near by: a pose settles half a metre
+or two beside the right one, where the log-odds have long begun to rise.
 """
 
 from __future__ import annotations
@@ -19,16 +19,22 @@ from hybridreg.geometry.stencil import NEIGHBOURS
 
 Array = NDArray[np.float64]
 
-# First and last step along the commonest surface, in spacings.
-_FIRST, _LAST = 1.0, 0.375
-# A turn moves points at this quantile of the distances from the middle by so many steps.
-_ARM, _TURN = 0.7, 1.5
-# Neighbours by both shifts along the commonest surface and the turn about its normal: first those that move by one of
-# them, and where none is better all others.
+# First step along the commonest surface, spacings; by hand.
+_FIRST = 1.0
+# Last step, spacings; by hand.
+_LAST = 0.375
+# Quantile of the points' distances from their centroid: the arm of a rotation; by hand.
+_ARM = 0.7
+# Steps by which a rotation moves a point at that arm; by hand.
+_TURN = 1.5
+# Neighbours by both shifts along the commonest surface and the rotation about its normal: first those that change one
+# of these, and where none is better all others.
 _MOVED = np.count_nonzero(NEIGHBOURS, axis=1)
 _NEIGHBOURS = (NEIGHBOURS[_MOVED == 1], NEIGHBOURS[_MOVED > 1])
-# So many-th of the asked points are looked at; rounds at most, as along a corridor the support may rise for ever.
-_STRIDE, _ROUNDS = 2, 15
+# Stride over the sampled points: for speed.
+_STRIDE = 2
+# Rounds at most, as along a corridor the log-odds may rise for ever; by hand.
+_ROUNDS = 15
 
 
 def climb(both: Views, T_target_source: Array) -> PoseEvidence:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Where else near a pose do the same things stand? Rows, racks, ribs, and maps that hold a place twice."""
+"""Repeated structure near a pose: rows, racks, ribs, and maps that hold a place twice."""
 
 from __future__ import annotations
 
@@ -12,22 +12,29 @@ from hybridreg.geometry.main_axes import faced
 
 Array = NDArray[np.float64]
 
-# Edge of a cell and farthest shift, in spacings: up to 10 m outdoors, a metre in a room.
-_CELL, _FARTHEST = 1.0, 20.0
-# Turns that are tried with each shift, degrees; points that are shifted; the share of those that meet at the pose which
-# must meet elsewhere.
-_TURNS_DEG, _POINTS, _SHARE = (-3.0, -1.5, 0.0, 1.5, 3.0), 400, 0.4
-# Shifts returned, and how far apart they lie at least, in cells.
-_MOST, _APART = 4, 2
-# Fewest points that tell of a place.
+# Edge of a cell, spacings; by hand.
+_CELL = 1.0
+# Farthest shift, spacings: up to 10 m outdoors, a metre in a room; by hand.
+_FARTHEST = 20.0
+# Rotations tried with each shift, degrees; by hand.
+_TURNS_DEG = (-3.0, -1.5, 0.0, 1.5, 3.0)
+# Points that are shifted: for speed.
+_POINTS = 400
+# Share of the points that coincide at the pose which must coincide elsewhere; by hand.
+_SHARE = 0.4
+# Shifts returned, at most; by hand.
+_MOST = 4
+# Cells between two of them, at least; by hand.
+_APART = 2
+# Fewest points that identify a place; by hand.
 _FEWEST = 20
 
 
 def copies(views: Views, T_target_source: Array, axes: Array) -> list[Array]:
-    """Poses (4, 4) beside a pose, shifted along the commonest surface, at which nearly as many things meet.
+    """Poses (4, 4) beside a pose, shifted along the commonest surface, at which nearly as many points coincide.
 
-    Things are points that do not face the commonest way `axes[0]` (on a street, all but its ground); two meet in one
-    cell of a grid.
+    Only points that do not face the commonest axis `axes[0]` count (on a street, all but its ground); two points
+    coincide in one cell of a grid.
     """
     source, target, spacing = views.source, views.target, views.spacing
     frame = np.vstack([axes[1:], axes[:1]])  # the commonest direction last

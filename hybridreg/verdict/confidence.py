@@ -22,13 +22,17 @@ from hybridreg.verdict.boosted import Boosted
 
 Word = Literal["ok", "doubtful", "failed"]
 
+# Probability below which a pose is "failed": it is more likely wrong than right.
 FAILED = 0.5
-# No more is believed of a pose that turns the world over, nor of one at which the source fits better by so many nats
-# per point at another size (of some 400 right training answers none gained 0.08).
-_OVERTURNED, DOUBTED, SIZE_GAIN = 0.3, 0.9, 0.12
-# Log-odds by which a rival may do better and still be as good.
+# Probability of a pose that turns the world upside down, at most: by hand.
+_OVERTURNED = 0.3
+# Probability of a pose at which the source fits better at another scale, or the input looks mistaken, at most: by hand.
+DOUBTED = 0.9
+# Nats per point from which it fits better at another scale: of some 400 right training poses none gained 0.08.
+SIZE_GAIN = 0.12
+# Log-odds by which a rival may be likelier and still count as equal; by hand.
 _EQUAL = 1.0
-# What speaks for a pose (+1) or against it (-1) the more there is of it; nought may do either.
+# Evidence that speaks for a pose the larger it is (+1), or against it (-1); 0 may do either.
 SPEAKS = {
     "agreement_least": 1,
     "agreement_middle": 1,
@@ -75,15 +79,15 @@ def confidence(evidence: Evidence, rule: Boosted | None = None) -> float:
 
 
 def _one_of_two(told: Mapping[str, float], rule: Boosted) -> bool:
-    # Beyond doubt were it not for a rival that explains the clouds about as well: one of them is right (of 103 such
-    # training answers 37 were).
+    # Beyond doubt were it not for a rival that explains the clouds about as well: one of the two is right (of 103 such
+    # training poses 37 were).
     alone = rule({**told, "rival_margin": NO_RIVAL})
     return told["rival_margin"] < _EQUAL and alone >= NEARLY
 
 
 def believed(log_odds: float, rival_margin: float) -> float:
-    """Probability by the trees, yet no more than the pose's share between itself and its best rival: of two that
-    explain the data alike at most one is right."""
+    """Probability by the trees, but no more than the pose's share between itself and its best rival: of two that
+    explain the data equally well at most one is right."""
     return float(1.0 / (1.0 + np.exp(max(-log_odds, rival_margin))))
 
 

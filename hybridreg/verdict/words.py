@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The evidence in sentences, the gravest first."""
+"""The evidence in sentences, the most serious first."""
 
 from __future__ import annotations
 
@@ -13,8 +13,17 @@ from hybridreg.evidence.information import Information
 from hybridreg.evidence.log_odds import NEARLY
 from hybridreg.verdict.confidence import SIZE_GAIN
 
-# Where a number becomes worth a sentence. In simulated scenes nine in ten right poses stayed on the good side.
-LOOKED_THROUGH, AGREEMENT, WEAK, OVERLAP, FEW = 0.12, 0.3, 0.02, 0.15, 60
+# The bounds beyond which a number is worth a sentence; nine in ten right poses of simulated scenes stay within them.
+# Share of the visible points that violates free space.
+LOOKED_THROUGH = 0.12
+# Share of the visible points of an axis that agrees.
+AGREEMENT = 0.3
+# Smallest eigenvalue of the information per point.
+WEAK = 0.02
+# Visible share of either cloud.
+OVERLAP = 0.15
+# Points or cells; by hand.
+FEW = 60
 
 
 def reasons(
@@ -25,7 +34,7 @@ def reasons(
     found: bool,
     unseen: Mapping[str, str],
 ) -> tuple[str, ...]:
-    """Why the verdict is what it is; never empty. `unseen` tells why a cloud has no sensor's place."""
+    """Why the verdict is what it is; never empty. `unseen` says why the viewpoint of a cloud is unknown."""
     if not found:
         return ("no pose was found: the estimator had nothing to work with, and returned the identity",)
     against = (*_against(evidence, agreement, held), *_unknown(unseen))
@@ -35,7 +44,7 @@ def reasons(
 def _against(evidence: Evidence, agreement: Agreement, held: Information) -> Iterator[str]:
     if evidence.overturned:
         yield (
-            "the pose turns the world over, or puts a sensor under the other cloud's ground; where one cloud may be "
+            "the pose turns the world upside down, or puts a sensor below the other cloud's ground; if a cloud may be "
             'upside down, say so: gravity="unknown" (--gravity unknown)'
         )
     if evidence.size_gain > SIZE_GAIN:
@@ -46,7 +55,7 @@ def _against(evidence: Evidence, agreement: Agreement, held: Information) -> Ite
     through = evidence.looked_through
     if through > LOOKED_THROUGH:
         yield (
-            f"the sensors looked through {through:.0%} of the points that they should have hit "
+            f"free space is violated: the sensors saw through {through:.0%} of the points that they should have hit "
             f"({evidence.looked_through_source:.0%} of the source's, "
             f"{evidence.looked_through_target:.0%} of the target's)"
         )
@@ -59,35 +68,35 @@ def _against(evidence: Evidence, agreement: Agreement, held: Information) -> Ite
     elif margin > -NEARLY:
         yield f"another pose explains the data nearly as well (its support is lower by {-margin:.2f}; see rivals)"
     if held.weakest < WEAK:
-        yield f"little holds the clouds {held.words}: {held.weakest:.1%} of the surfaces' information"
+        yield f"the pose is poorly constrained {held.words}: {held.weakest:.1%} of the surfaces' information"
     overlap = max(evidence.visible_source, evidence.visible_target)
     if overlap < OVERLAP:
-        yield f"little overlap: neither sensor looked at more than {overlap:.0%} of the other's points"
+        yield f"little overlap: neither sensor sees more than {overlap:.0%} of the other's points"
 
 
 def _about_axis(agreement: Agreement, k: int) -> str:
     direction = " ".join(f"{x:.2f}" for x in agreement.axes[k])
     looked, agreed = int(agreement.looked[k]), int(agreement.agreed[k])
     if looked < FEW:
-        return f"only {looked} points in view of both sensors face along ({direction}) of the target, {agreed} agree"
-    return f"of {looked} points that face along ({direction}) of the target and were looked at, only {agreed} agree"
+        return f"only {looked} points visible to both sensors face along ({direction}) of the target, {agreed} agree"
+    return f"of {looked} visible points that face along ({direction}) of the target, only {agreed} agree"
 
 
 def _unknown(unseen: Mapping[str, str]) -> Iterator[str]:
     for name, why in unseen.items():
-        yield f"where the {name} was seen from is not known ({why}): free space could not be tested from there"
+        yield f"the viewpoint of the {name} is unknown ({why}): free space could not be tested from there"
 
 
 def _in_favour(evidence: Evidence) -> str:
     cells = int(evidence.relief_cells)
     relief = (
-        f"; the ground's hollows are alike by {evidence.relief_correlation:.2f} (correlation over {cells} cells)"
+        f"; the ground relief correlates by {evidence.relief_correlation:.2f} over {cells} cells"
         if cells >= FEW
         else ""
     )
     return (
-        f"of the points that the other sensor looked at, {evidence.fitness_visible_source:.0%} of the source's and "
+        f"of the points visible to the other sensor, {evidence.fitness_visible_source:.0%} of the source's and "
         f"{evidence.fitness_visible_target:.0%} of the target's have a neighbour there; "
         f"{evidence.agreement_least:.0%} or more agree along each axis, "
-        f"{evidence.looked_through:.0%} were looked through{relief}"
+        f"{evidence.looked_through:.0%} violate free space{relief}"
     )

@@ -47,7 +47,7 @@ def test_a_pose_that_turns_the_world_over_is_failed(crossing: Made) -> None:
     assert overturned(source, target, over @ crossing.truth)
     judgement = judge(crossing.scene, Pose(over @ crossing.truth), NONE)
     assert judgement.verdict == "failed"
-    assert "turns the world over" in judgement.reasons[0]
+    assert "turns the world upside down" in judgement.reasons[0]
 
 
 def test_a_pose_that_puts_a_sensor_under_the_ground_is_failed(crossing: Made) -> None:

@@ -40,7 +40,7 @@ def test_half_a_turn_is_not_ok(place: str, request: pytest.FixtureRequest) -> No
     made: Made = request.getfixturevalue(place)
     judgement = judge(made.scene, Pose(settled(made.scene, se3.yaw(180.0) @ made.truth)), NONE)
     assert judgement.verdict == "failed", words(judgement)
-    assert "looked through" in judgement.reasons[0]
+    assert "free space is violated" in judgement.reasons[0]
 
 
 @pytest.mark.parametrize("metres", [-10.0, -5.0, 5.0, 10.0])

@@ -191,4 +191,4 @@ def test_the_result_says_when_a_place_is_not_known() -> None:
     source = street_scan()
     result = pipe.run(hr.Pair.of(source, source, target_viewpoint="none"))
     assert any("target was seen from no known place" in note for note in result.notes)
-    assert any("where the target was seen from is not known" in reason for reason in result.reasons)
+    assert any("the viewpoint of the target is unknown" in reason for reason in result.reasons)
