@@ -37,7 +37,7 @@ class Pair:
     meta : mapping
         Free facts for reports. Never the pose.
     gravity : "known" or "unknown"
-        "known": both clouds stand on the same side of their ground, so that a pose which turns the world upside down is wrong.
+        "known": both clouds have the same side of the ground up, so that a pose which turns the world upside down is wrong.
         "unknown": they may not (an object that was turned over between two scans).
     """
 
