@@ -4,14 +4,15 @@ CONSTRAINTS ?= constraints.txt
 BIN := .venv/bin
 DATA ?= ../shared/data/real
 
-.PHONY: install demo test lint types bench clean
+.PHONY: install demo test light dist lint types bench clean
 
 install: .venv/installed
 
 .venv/installed: pyproject.toml constraints.txt
+	@echo "Everything, for development, goes into .venv: 3 to 7 GB, most of it torch and open3d. It takes minutes once."
 	$(PYTHON) -m venv .venv
 	$(BIN)/python -m pip install --quiet --upgrade pip
-	$(BIN)/python -m pip install --quiet --constraint $(CONSTRAINTS) --editable ".[test,dev]"
+	$(BIN)/python -m pip install --constraint $(CONSTRAINTS) --editable ".[all,test,dev]"
 	touch $@
 
 demo: install
@@ -19,6 +20,14 @@ demo: install
 
 test: install
 	OMP_NUM_THREADS=2 $(BIN)/python -m pytest -q
+
+# What a plain `pip install hybridreg` gives: the wheel in an environment of its own, without torch and open3d.
+light:
+	PYTHON=$(PYTHON) tools/light.sh build/light
+
+# What could be uploaded as it is.
+dist: install
+	rm -rf dist && $(BIN)/python -m build && $(BIN)/twine check --strict dist/*
 
 lint: install
 	$(BIN)/ruff check .

@@ -100,7 +100,10 @@ def __getattr__(name: str) -> _Any:
     # Names are imported when they are asked for, so that `import hybridreg` costs next to nothing.
     if name not in _MODULE_OF:
         raise AttributeError(f"module 'hybridreg' has no attribute {name!r}")
-    return getattr(_import_module(_MODULE_OF[name]), name)
+    from hybridreg.runtime import optional_packages
+
+    with optional_packages.told(f"hybridreg.{name}"):
+        return getattr(_import_module(_MODULE_OF[name]), name)
 
 
 def __dir__() -> list[str]:

@@ -37,8 +37,8 @@ class Pair:
     meta : mapping
         Free facts for reports. Never the pose.
     gravity : "known" or "unknown"
-        "known": both clouds have the same side of the ground up, so that a pose which turns the world upside down is wrong.
-        "unknown": they may not (an object that was turned over between two scans).
+        "known": both clouds have the same side of the ground up, so that a pose that turns the world upside down is
+        wrong. "unknown": they may not (an object that was turned over between two scans).
     """
 
     source: PointCloud

@@ -21,6 +21,7 @@ from hybridreg.matches import Correspondences, Overlap, Pose
 from hybridreg.pair import Pair
 from hybridreg.resolution import tolerance
 from hybridreg.result import RegistrationResult
+from hybridreg.runtime import optional_packages
 from hybridreg.runtime.resources import Clock, peak_memory_mb, reset_peak_memory
 from hybridreg.scene import Scene
 from hybridreg.slots import SLOTS
@@ -130,9 +131,12 @@ class Pipeline(Stage):
         ------
         ValueError
             For clouds that no pose can be computed from, naming cloud, number and cure; for a negative seed.
+        ImportError
+            A stage needs a package that is not installed; the message names the extra that brings it.
         """
         reset_peak_memory()
-        return self.conclude(self.trace(pair, seed=seed, matches=matches), seed=seed)
+        with optional_packages.told("a stage of this pipeline"):
+            return self.conclude(self.trace(pair, seed=seed, matches=matches), seed=seed)
 
     def conclude(self, trace: Trace, *, seed: int = 0) -> RegistrationResult:
         """The verdict on a traced run, and its result in the coordinates that the user gave."""

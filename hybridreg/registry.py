@@ -9,7 +9,7 @@ from importlib import import_module
 from importlib.metadata import entry_points
 from typing import Any
 
-from hybridreg.runtime import plugins
+from hybridreg.runtime import optional_packages, plugins
 from hybridreg.slots import SLOTS
 
 ENTRY_POINTS = "hybridreg.stages"
@@ -72,7 +72,8 @@ def load(slot: str, name: str) -> type[Any]:
     KeyError
         For a name that nobody registered; it lists the known ones.
     ImportError
-        A plug-in that cannot be loaded, whatever its import raises.
+        A plug-in that cannot be loaded, whatever its import raises; a package that is not installed, with the extra
+        that brings it.
     """
     if slot not in SLOTS:
         raise KeyError(f"no slot is called {slot!r}; the slots are {', '.join(SLOTS)}")
@@ -84,7 +85,8 @@ def load(slot: str, name: str) -> type[Any]:
     if f"{slot}.{name}" not in BUILT_IN:
         return plugins.load(target, f"{slot} stage {name!r}", ENTRY_POINTS)
     module, _, attribute = target.partition(":")
-    cls: type[Any] = getattr(import_module(module), attribute)
+    with optional_packages.told(f'{slot}="{name}"'):
+        cls: type[Any] = getattr(import_module(module), attribute)
     return cls
 
 

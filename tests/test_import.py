@@ -98,4 +98,4 @@ def test_without_open3d_the_rest_works() -> None:
     verdict, message = run(blocked).strip().splitlines()
     assert verdict == "ok"
     assert "open3d" in message
-    assert "pip install open3d" in message
+    assert "hybridreg[open3d]" in message

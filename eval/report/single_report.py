@@ -12,18 +12,34 @@ from hybridreg.frames import lower_pose
 from hybridreg.io import write_text
 from hybridreg.pair import Pair
 from hybridreg.result import RegistrationResult
+from hybridreg.runtime import optional_packages
 
 
 def write(pair: Pair, result: RegistrationResult, out: str | os.PathLike[str]) -> list[Path]:
-    """Write `T_target_source.txt`, `result.json`, `report.html` and `before_after.png` into a folder."""
+    """Write `T_target_source.txt`, `result.json`, `report.html` and `before_after.png` into a folder.
+
+    Warns
+    -----
+    UserWarning
+        The page or the picture is left out for want of a package.
+    """
     folder = Path(out)
     folder.mkdir(parents=True, exist_ok=True)
     result.save(folder / "T_target_source.txt")
     result.save(folder / "result.json")
-    write_text(folder / "report.html", html(pair, result))
     T = lower_pose(result.transformation, pair)
-    cloud_pictures.before_after(folder / "before_after.png", pair.source.points, pair.target.points, T)
-    return [folder / n for n in ("T_target_source.txt", "result.json", "report.html", "before_after.png")]
+    drawn = {
+        "report.html": lambda path: write_text(path, html(pair, result)),
+        "before_after.png": lambda path: cloud_pictures.before_after(
+            path, pair.source.points, pair.target.points, T
+        ),
+    }
+    written = ["T_target_source.txt", "result.json"]
+    for name, draw in drawn.items():
+        with optional_packages.left_out_unless_installed(name):
+            draw(folder / name)
+            written.append(name)
+    return [folder / name for name in written]
 
 
 def html(pair: Pair, result: RegistrationResult) -> str:

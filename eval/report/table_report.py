@@ -20,6 +20,7 @@ from hybridreg.eval.score.scoring import identity
 from hybridreg.eval.table_run import Entry, Table
 from hybridreg.io import write_text
 from hybridreg.pair import LabelledPair
+from hybridreg.runtime import optional_packages
 
 # A browser keeps about sixteen 3D views alive; half of that leaves room for another page.
 _MOST_VIEWS = 8
@@ -45,6 +46,11 @@ def write(
     ------
     OSError
         Files that could not be written: the first is named with its reason, and those that were written are there.
+
+    Warns
+    -----
+    UserWarning
+        The page is left out for want of plotly.
     """
     folder = Path(out)
     folder.mkdir(parents=True, exist_ok=True)
@@ -56,15 +62,18 @@ def write(
         "report.html": lambda: html(table, protocols, pairs),
     }
     failed: list[OSError] = []
+    written = []
     for name, make in contents.items():
-        text = make()
-        try:
-            write_text(folder / name, text)
-        except OSError as error:
-            failed.append(error)
+        with optional_packages.left_out_unless_installed(name):
+            text = make()
+            try:
+                write_text(folder / name, text)
+                written.append(folder / name)
+            except OSError as error:
+                failed.append(error)
     if failed:
         raise failed[0]
-    return [folder / name for name in contents]
+    return written
 
 
 def html(table: Table, protocols: Sequence[Protocol], pairs: Sequence[LabelledPair] | None = None) -> str:

@@ -3,8 +3,11 @@
 
 from __future__ import annotations
 
+from typing import Annotated
+
 import typer
 
+import hybridreg
 from hybridreg.cli import datasets, demo, doctor, evaluate, listing, register, report, simulate, table, train
 
 app = typer.Typer(
@@ -14,6 +17,23 @@ app = typer.Typer(
     add_completion=False,
     pretty_exceptions_enable=False,
 )
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        print(f"hybridreg {hybridreg.__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _common(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version.")
+    ] = False,
+) -> None:
+    pass
+
+
 app.command("register")(register.command)
 app.command("eval")(evaluate.command)
 app.command("table")(table.command)

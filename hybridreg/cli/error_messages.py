@@ -18,6 +18,7 @@ from hybridreg.cli import stop_signals
 from hybridreg.cli.command_line_cures import spoken
 from hybridreg.cli.console import make_ready
 from hybridreg.cli.memory_errors import lacks_memory, memory_sentence, require_addresses
+from hybridreg.runtime import optional_packages
 
 BAD_INPUT, VERDICT_FAILED = 2, 3
 
@@ -86,6 +87,8 @@ def sentence(error: BaseException) -> str:
     else:
         # str(KeyError) puts quotes around the sentence.
         text = str(error.args[0]) if error.args else type(error).__name__
+    if isinstance(error, ModuleNotFoundError) and error.name:
+        text += f"; this needs {optional_packages.cure(error.name)}"
     return " ".join(text.split())
 
 

@@ -7,6 +7,8 @@ import ctypes
 import importlib
 from types import ModuleType
 
+from hybridreg.runtime.optional_packages import cure
+
 
 def load_open3d() -> ModuleType:
     """Import open3d, also on a Linux machine that lacks the system's libusb.
@@ -19,7 +21,7 @@ def load_open3d() -> ModuleType:
     try:
         return importlib.import_module("open3d")
     except ModuleNotFoundError as error:
-        raise ImportError(f"this needs open3d, run `pip install open3d` ({error})") from error
+        raise ImportError(f"this needs {cure('open3d')} ({error})") from error
     except (ImportError, OSError) as error:
         if "libusb" not in str(error):
             raise ImportError(f"open3d is installed, but this machine cannot load it: {error}") from error

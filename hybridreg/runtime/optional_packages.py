@@ -5,17 +5,32 @@ from __future__ import annotations
 
 import importlib
 import sys
+import warnings
 from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from importlib.util import find_spec
 from typing import Any
 
-# Module to distribution, and the last Python for which there are wheels of it (None: all that we support).
-_DISTRIBUTIONS: dict[str, tuple[str, tuple[int, int] | None]] = {
-    "kiss_matcher": ("kiss-matcher", (3, 12)),
-    "kiss_icp": ("kiss-icp", None),
-    "small_gicp": ("small_gicp", None),
-    "open3d": ("open3d", None),
-    "torch": ("torch", None),
+# Module to distribution, the extra of ours that brings it (empty: it always comes), and the last Python for which there
+# are wheels of it (None: all that we support).
+_DISTRIBUTIONS: dict[str, tuple[str, str, tuple[int, int] | None]] = {
+    "cv2": ("opencv-python-headless", "image", None),
+    "dask": ("dask", "cluster", None),
+    "distributed": ("distributed", "cluster", None),
+    "embreex": ("embreex", "embree", None),
+    "kiss_icp": ("kiss-icp", "kiss", None),
+    "kiss_matcher": ("kiss-matcher", "kiss", (3, 12)),
+    "laspy": ("laspy", "las", None),
+    "lightning_fabric": ("lightning-fabric", "train", None),
+    "matplotlib": ("matplotlib", "report", None),
+    "open3d": ("open3d", "open3d", None),
+    "plotly": ("plotly", "report", None),
+    "pye57": ("pye57", "e57", None),
+    "rosbags": ("rosbags", "ros", None),
+    "safetensors": ("safetensors", "learned", None),
+    "sklearn": ("scikit-learn", "train", None),
+    "small_gicp": ("small_gicp", "", None),
+    "torch": ("torch", "learned", None),
 }
 
 
@@ -34,12 +49,37 @@ def load(module: str, purpose: str) -> Any:
 
 
 def cure(module: str) -> str:
-    """How to get the distribution of a module on this Python."""
-    name, last = _DISTRIBUTIONS.get(module, (module, None))
+    """How to get the distribution of a module on this Python: by our extra that brings it, where one does."""
+    top = module.partition(".")[0]
+    name, extra, last = _DISTRIBUTIONS.get(top, (top, "", None))
     if last is not None and sys.version_info[:2] > last:
         here, until = (".".join(map(str, each)) for each in (sys.version_info[:2], last))
         return f"{name}, which has no wheel for Python {here}: use Python 3.10 to {until}"
-    return f"{name}: run `pip install {name}`"
+    what = f"'hybridreg[{extra}]'" if extra else name
+    return f"{name}: run `pip install {what}`"
+
+
+@contextmanager
+def told(purpose: str) -> Iterator[None]:
+    """Within the block, a module that is not installed and that an extra of ours brings is told as `load` tells it."""
+    try:
+        yield
+    except ModuleNotFoundError as error:
+        if (error.name or "").partition(".")[0] not in _DISTRIBUTIONS:
+            raise
+        raise ImportError(f"{purpose} needs {cure(str(error.name))} ({error})") from error
+
+
+@contextmanager
+def left_out_unless_installed(what: str) -> Iterator[None]:
+    """As `told`, but a warning: the block's work is left out, and what follows goes on."""
+    try:
+        with told(what):
+            yield
+    except ImportError as error:
+        if not isinstance(error.__cause__, ModuleNotFoundError):
+            raise
+        warnings.warn(f"left out: {error}", UserWarning, stacklevel=3)
 
 
 def left_out(method: Any) -> str:

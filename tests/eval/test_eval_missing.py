@@ -71,7 +71,7 @@ def test_a_line_whose_package_is_missing_was_not_run(
     for file in table_report.write(done, table_file.parse(ROWS).protocols, tmp_path, pairs):
         text = file.read_text()
         assert "kiss-gicp" in text, file.name
-        assert "pip install kiss-matcher" in text or "no wheel for Python" in text, file.name
+        assert "hybridreg[kiss]" in text or "no wheel for Python" in text, file.name
         if file.suffix == ".csv":
             row = next(row for row in csv.DictReader(text.splitlines()) if row["method"] == "kiss-gicp")
             assert row["recall"] == ""
@@ -168,7 +168,7 @@ def test_a_python_without_a_wheel_is_told(monkeypatch: pytest.MonkeyPatch) -> No
         == "kiss-matcher, which has no wheel for Python 3.13: use Python 3.10 to 3.12"
     )
     monkeypatch.setattr(sys, "version_info", (3, 12, 1, "final", 0))
-    assert optional_packages.cure("kiss_matcher") == "kiss-matcher: run `pip install kiss-matcher`"
+    assert optional_packages.cure("kiss_matcher") == "kiss-matcher: run `pip install 'hybridreg[kiss]'`"
 
 
 @pytest.mark.parametrize("name", ["=1+1", "@evil", "+a", "-b", "\t=c"])

@@ -6,7 +6,6 @@ import pickle
 import struct
 import zlib
 
-import cv2
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -15,6 +14,8 @@ from hypothesis.extra import numpy as hnp
 
 from hybridreg.io import as_image, read_image
 from hybridreg.io.formats.image_size import image_size
+
+cv2 = pytest.importorskip("cv2")
 
 
 @pytest.fixture(scope="module")

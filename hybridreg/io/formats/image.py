@@ -14,6 +14,7 @@ from hybridreg.io.faults import fault
 from hybridreg.io.formats.image_size import image_size
 from hybridreg.io.signatures import kind_of
 from hybridreg.io.whole_files import read_whole
+from hybridreg.runtime.optional_packages import load
 
 _NOT_AN_IMAGE = "give a photograph that an image viewer opens (.png, .jpg, .tif, .bmp, .webp)"
 # The largest sensors of telephones have 200 million; decoded they take 0.6 GB, twice that on the way.
@@ -148,8 +149,7 @@ def _eight_bits(pixels: NDArray[Any], name: str) -> NDArray[Any]:
 
 
 def _decode(data: bytes) -> NDArray[Any] | None:
-    import cv2
-
+    cv2 = load("cv2", "an image")
     # ANYDEPTH keeps 16 bits for our own rounding; COLOR turns the image upright, which UNCHANGED does not.
     try:
         return cv2.imdecode(np.frombuffer(data, dtype=np.uint8), cv2.IMREAD_COLOR | cv2.IMREAD_ANYDEPTH)

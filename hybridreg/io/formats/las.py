@@ -13,6 +13,7 @@ from hybridreg.io.faults import fault, foreign_parser
 from hybridreg.io.formats.las_header import check_las_header
 from hybridreg.io.formats.las_units import in_metres
 from hybridreg.io.record_fields import stack_axes
+from hybridreg.runtime.optional_packages import load
 
 _CHUNK = 64 * 2**20  # bytes, so that memory grows with what a LAZ file holds, not with what it promises
 
@@ -42,8 +43,4 @@ def _axes(chunk: Any) -> tuple[NDArray[np.float64], ...]:
 
 
 def _laspy() -> Any:
-    try:
-        import laspy
-    except ImportError as error:
-        raise ImportError(f"LAS files need laspy, run `pip install 'hybridreg[las]'` ({error})") from error
-    return laspy
+    return load("laspy", "a LAS file")

@@ -9,6 +9,7 @@ from contextlib import AbstractContextManager, nullcontext
 from typing import Any
 
 from hybridreg.io.faults import fault, shorten
+from hybridreg.runtime.optional_packages import load
 
 _TRUSTED = "nothing of it was run; take the file from where its authors publish it"
 
@@ -23,8 +24,7 @@ def parse_torch(data: bytes, name: str) -> Any:
     ImportError
         Without torch.
     """
-    import torch
-
+    torch = load("torch", f"{name}: a file of torch's")
     try:
         with _settings():
             return torch.load(io.BytesIO(data), map_location="cpu", weights_only=True)
