@@ -21,6 +21,7 @@ from hybridreg.matches import Correspondences, Overlap, Pose
 from hybridreg.pair import Pair
 from hybridreg.resolution import tolerance
 from hybridreg.result import RegistrationResult
+from hybridreg.returned import checked
 from hybridreg.runtime.resources import peak_memory_mb, reset_peak_memory, stopwatch
 from hybridreg.scene import Scene
 from hybridreg.slots import SLOTS
@@ -168,7 +169,7 @@ class Pipeline(Stage):
         rng = np.random.default_rng([seed, zlib.crc32(pair.id.encode())])
         seconds: dict[str, float] = {}
         with stopwatch(seconds, "downsample"):
-            scene = self.downsample(pair)
+            scene = checked("downsample", self.downsample, self.downsample(pair))
         fitting.check_scene(scene)
         for name, cloud in (("source", scene.pair.source), ("target", scene.pair.target)):
             if len(cloud.seen.places) != 1:
@@ -178,16 +179,18 @@ class Pipeline(Stage):
                     f"{cloud.dropped} points of the {name} were missing (not finite, or at 0, 0, 0) and were dropped"
                 )
         with stopwatch(seconds, "overlap"):
-            overlap = self.overlap(scene)
+            overlap = checked("overlap", self.overlap, self.overlap(scene), scene)
         with stopwatch(seconds, "match"):
             if matches is None:
-                found = scene.matched(self.match(scene, overlap))
+                found = scene.matched(checked("match", self.match, self.match(scene, overlap)))
             else:
                 found = scene.matched(lower_matches(matches, pair))
         with stopwatch(seconds, "estimate"):
-            estimated = _proper(self.estimate(scene, found, rng))
+            estimated = _proper(checked("estimate", self.estimate, self.estimate(scene, found, rng), scene))
         with stopwatch(seconds, "refine"):
-            refined = _proper(self.refine(scene, estimated)) if estimated.found else estimated
+            refined = estimated
+            if estimated.found:
+                refined = _proper(checked("refine", self.refine, self.refine(scene, estimated), scene))
         if not len(found):  # an estimator that runs recipes of its own may have matched
             found = of_most(scene, refined.T)
         return Trace(scene, overlap, found, estimated, refined, seconds)

@@ -14,7 +14,7 @@ from hybridreg.cli.error_messages import plainly, sentence
 _NEEDED = {
     "numpy": ("numpy", "everything"),
     "scipy": ("scipy", "everything"),
-    "sklearn": ("scikit-learn", "FPFH matching"),
+    "sklearn": ("scikit-learn", "fitting the confidence anew (hybridreg.verdict.training)"),
     "cv2": ("opencv-python-headless", "images"),
     "open3d": ("open3d", "FPFH, FGR, Open3D's RANSAC"),
     "small_gicp": ("small_gicp", "GICP"),

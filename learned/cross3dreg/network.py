@@ -186,14 +186,18 @@ class RegistrationNetwork(Pretrained):
     ) -> tuple[SuperpointMatches, PointMatches]:
         """Superpoint and point matches of the kept superpoints with their attended features.
 
-        ``filtered`` false keeps matches that do not move with the others, whatever the configuration says.
+        ``filtered`` false keeps all of them, whatever the configuration says: those that are not unique, that the mask
+        doubts, and that do not move with the others.
         """
         similarity = self.compare_points(encoding, kept)
         superpoints = self.match_superpoints(encoding, kept, features, similarity)
+        matches = self.match_points(encoding, superpoints, similarity, filtered=filtered)
+        if not filtered:
+            return superpoints, matches
         doubted = 0.0 if self.config.omp is None else self.config.omp.doubted
-        matches = believed(encoding, kept, self.match_points(encoding, superpoints, similarity), doubted)
+        matches = believed(encoding, kept, matches, doubted)
         reach = self.config.matching.consistency
-        if filtered and reach is not None:
+        if reach is not None:
             matches = matches.only(consistent(matches.target, matches.source, matches.weight, reach))
         return superpoints, matches
 
@@ -253,18 +257,22 @@ class RegistrationNetwork(Pretrained):
         return torch.bmm(target, source.transpose(1, 2)) / scale
 
     def match_points(
-        self, encoding: Encoding, superpoints: SuperpointMatches, similarity: PointSimilarity | None = None
+        self,
+        encoding: Encoding,
+        superpoints: SuperpointMatches,
+        similarity: PointSimilarity | None = None,
+        *,
+        filtered: bool = True,
     ) -> PointMatches:
-        """Point correspondences of the matched superpoints' patches, those that are unique enough."""
+        """Point correspondences of the matched superpoints' patches; ``filtered``, those that are unique enough."""
         config = self.config.matching
         chunks = size_chunks(self.pair_up(encoding, superpoints.target, superpoints.source))
         blocks = [(chunk, self.assign(encoding, chunk, config.sinkhorn_form)) for chunk in chunks]
         matches = gather_matches(blocks, encoding.target.points, encoding.source.points, config)
         if similarity is not None:
             unique = similarity.uniqueness(matches.target_index, matches.source_index)
-            matches = replace(matches, weight=(matches.weight * unique).sqrt()).only(
-                unique > config.uniqueness
-            )
+            matches = replace(matches, weight=(matches.weight * unique).sqrt())
+            matches = matches.only(unique > config.uniqueness) if filtered else matches
         return matches
 
     def memory(self, batch: Batch) -> int:

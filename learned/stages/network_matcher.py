@@ -12,6 +12,8 @@ from hybridreg.runtime.threads import single
 from hybridreg.scene import Scene
 
 if TYPE_CHECKING:
+    from typing_extensions import Self
+
     from hybridreg.learned.cross3dreg.network import RegistrationNetwork
     from hybridreg.learned.matching.point_matching import PointMatches
 
@@ -26,8 +28,8 @@ class NetworkMatcher(NetworkStage):
         Superpoints with a lower probability of overlap are left out, unless too few would remain. None takes
         the threshold that the network was trained with.
     filtered : bool
-        Leave out matches that do not move with the others, where the network's configuration has a distance for that
-        (`MatchingConfig.consistency`). Without it the matches are what the features alone say.
+        Leave out matches that are not unique, that the mask doubts and that do not move with the others, where the
+        network's configuration asks for that. Without it the matches are what the features alone say.
     as_published : bool
         Match as arXiv 2509.06456 prints it, and GeoTransformer with it, whatever the configuration adds
         (`hybridreg.learned.cross3dreg.as_published`): no votes, no uniqueness, no filter, the mask cut at 0.5.
@@ -62,6 +64,23 @@ class NetworkMatcher(NetworkStage):
         if self.similarity is not None:
             config = replace(config, matching=replace(config.matching, similarity=self.similarity))
         return network.configured(config)
+
+    def mask_threshold(self) -> float:
+        """Above which probability of overlap a superpoint goes on."""
+        from hybridreg.learned.cross3dreg.config import OmpConfig
+
+        if self.min_overlap is not None:
+            return self.min_overlap
+        return (self.configured().config.omp or OmpConfig()).threshold
+
+    def unfiltered(self) -> Self | None:
+        """The same matching without the filters that leave matches out; None where none does."""
+        from dataclasses import replace
+
+        config = self.configured().config
+        matching, doubted = config.matching, 0.0 if config.omp is None else config.omp.doubted
+        active = matching.uniqueness > 0.0 or matching.consistency is not None or doubted > 0.0
+        return replace(self, filtered=False) if self.filtered and active else None
 
     def __call__(self, scene: Scene, overlap: Overlap) -> Correspondences:
         import torch

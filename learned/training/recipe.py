@@ -159,8 +159,8 @@ class Recipe:
         vgam = self.network.vgam if self.kind == DEFAULT else None
         if vgam is not None and vgam.point_position == "radial" and self.augmentation.rotation == "full":
             raise ValueError(
-                "network.vgam: point_position='radial' means range and height, which augmentation.rotation='full' turns "
-                "into one another; choose point_position='mlp', or rotation='yaw'"
+                "network.vgam: point_position='radial' means range and height, which augmentation.rotation='full' "
+                "turns into one another; choose point_position='mlp', or rotation='yaw'"
             )
 
     def _check_other(self, phase: Phase) -> None:

@@ -108,7 +108,8 @@ def test_the_printed_form_has_no_gate() -> None:
 
 def test_a_network_is_built_of_the_printed_forms() -> None:
     config = named_config("nano", omp=True, vgam=True)
-    assert config.omp is not None and config.vgam is not None
+    assert config.omp is not None
+    assert config.vgam is not None
     printed = replace(
         config, omp=replace(config.omp, formula="text"), vgam=replace(config.vgam, formula="text")
     )
