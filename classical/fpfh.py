@@ -23,6 +23,8 @@ Indices = NDArray[np.int64]
 _RADIUS = 8.0
 # An overlap that leaves fewer points than this is taken to be wrong, and ignored.
 _FEWEST = 100
+# Of a superpoint's cell, in spacings: as coarse as the published networks' superpoints are against their first voxel.
+_CELL = 16.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -50,6 +52,9 @@ class Fpfh(Stage):
         Points with a lower probability of overlap are left out, unless too few would remain.
     max_points : int
         A cloud with more points to match is thinned to so many at random; noted in the result.
+    cell : float or None
+        Edge, metres, of the cells that stand for superpoints: matches between the same two cells are one group, from
+        which local-to-global estimation makes a pose. None takes 16 times the scene's spacing.
     """
 
     radius: float | None = None
@@ -59,12 +64,15 @@ class Fpfh(Stage):
     ratio: float | None = None
     min_overlap: float = 0.5
     max_points: int = 50_000
+    cell: float | None = None
 
-    gives: ClassVar[frozenset[str]] = frozenset({"matches"})
+    gives: ClassVar[frozenset[str]] = frozenset({"matches", "group"})
 
     def __post_init__(self) -> None:
         if self.radius is not None and not self.radius > 0.0:
             raise ValueError(f"radius={self.radius} must be a positive length in metres")
+        if self.cell is not None and not self.cell > 0.0:
+            raise ValueError(f"cell={self.cell} must be a positive length in metres")
         if self.ratio is not None and not 0.0 < self.ratio <= 1.0:
             raise ValueError(f"ratio={self.ratio} must lie in (0, 1]")
         if not 0.0 <= self.min_overlap <= 1.0:
@@ -87,9 +95,11 @@ class Fpfh(Stage):
         if self.ratio is not None:
             keep = keep & (found.distance < self.ratio * found.second)
         source_index, target_index = rows[0][keep], rows[1][found.row[keep]]
+        source, target = scene.source.points[source_index], scene.target.points[target_index]
         return Correspondences(
-            source=scene.source.points[source_index],
-            target=scene.target.points[target_index],
+            source=source,
+            target=target,
+            group=_groups(source, target, self.cell or _CELL * scene.spacing),
             weight=np.ones(len(source_index)),
             source_index=source_index,
             target_index=target_index,
@@ -116,6 +126,13 @@ class Fpfh(Stage):
             rng = np.random.default_rng(zlib.crc32(f"{scene.pair.id} {side}".encode()))
             rows = np.sort(rng.choice(rows, self.max_points, replace=False))
         return rows
+
+
+def _groups(source: Array, target: Array, cell: float) -> Indices:
+    """Which matches (K, 3) to (K, 3) join the same two cells, (K,), numbered from 0."""
+    pairs = np.floor(np.hstack([source, target]) / cell)
+    group: Indices = np.unique(pairs, axis=0, return_inverse=True)[1].reshape(-1)
+    return group
 
 
 def _fpfh(points: Array, normals: Array, radius: float, max_neighbours: int) -> Array:

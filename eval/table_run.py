@@ -15,8 +15,7 @@ from hybridreg.eval.run import store
 from hybridreg.eval.run.prediction import predict
 from hybridreg.eval.run.row import Row
 from hybridreg.eval.score import paper, scoring
-from hybridreg.eval.score.paper import Printed
-from hybridreg.eval.score.protocols import Protocol
+from hybridreg.eval.table import IDENTITY, Entry, Table
 from hybridreg.eval.table_file import Recipe, slug
 from hybridreg.io import write_json
 from hybridreg.io.lock import folder_lock
@@ -24,62 +23,7 @@ from hybridreg.io.structured import read_json
 from hybridreg.pair import LabelledPair
 from hybridreg.runtime import optional_packages
 
-IDENTITY = "identity"
 _INDEX = "table.json"
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class Entry:
-    """One method's rows; `config` is what made them."""
-
-    name: str
-    rows: list[Row]
-    config: dict[str, Any] = field(default_factory=dict)
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class Table:
-    """Methods side by side.
-
-    Attributes
-    ----------
-    entries : the identity first, then the methods
-    starts : turned copies of each pair
-    problems : lines that could not be built or run, with the reason
-    left_out : what some lines did without, for want of a package
-    paper : figures that somebody printed, to be shown apart
-    """
-
-    title: str
-    data: str
-    seed: int
-    starts: int
-    entries: list[Entry]
-    problems: dict[str, str] = field(default_factory=dict)
-    left_out: dict[str, str] = field(default_factory=dict)
-    paper: Printed | None = None
-
-    def remarks(self) -> list[str]:
-        """Sentences on what was not run."""
-        without = (f"{name} ran without {text}" for name, text in self.left_out.items())
-        return [*(f"Not run: {name}. {problem}" for name, problem in self.problems.items()), *without]
-
-    @property
-    def methods(self) -> list[Entry]:
-        """The entries but the identity."""
-        return [entry for entry in self.entries if entry.name != IDENTITY]
-
-    def scores(self, protocol: Protocol) -> dict[str, scoring.Score]:
-        """Score of every entry that has rows."""
-        return {entry.name: scoring.score(entry.rows, protocol) for entry in self.entries if entry.rows}
-
-    def caption(self, protocol: Protocol) -> str:
-        """Which number is this: the data, the starts, the protocol."""
-        n = max((len(entry.rows) for entry in self.entries), default=0)
-        runs = f"{n} pairs"
-        if self.starts:
-            runs = f"{n // (self.starts + 1)} pairs, each as it is and under {self.starts} random yaw starts, {n} runs"
-        return f"{self.title}. Data {self.data or 'unnamed'}, {runs}; {protocol.describe()}"
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -4,6 +4,8 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
+import types
 import warnings
 from numbers import Integral, Real
 from typing import TYPE_CHECKING, Any
@@ -26,6 +28,7 @@ _FARTHEST, _SMALLEST = 2_000.0, 0.05
 _MANY_CELLS = 100_000
 # Below this the grid has merged what there was to match.
 _FEW_LEFT = 200
+_FUNCTIONS = (types.FunctionType, types.MethodType, types.BuiltinFunctionType, functools.partial)
 
 
 def with_voxel(downsample: Any, voxel: float | None) -> Any:
@@ -57,10 +60,18 @@ def check(pipeline: Pipeline) -> None:
         if not callable(getattr(pipeline, slot)):
             raise ValueError(f"{slot}: {getattr(pipeline, slot)!r} is no stage; it must be callable")
     check_match(pipeline.match, pipeline.estimate)
+    masks = registry.name_of(pipeline.overlap) not in (None, "overlap.none")
+    if masks and registry.name_of(pipeline.match) == "match.none":
+        raise ValueError(
+            f"overlap: nothing looks at the mask of {_label(pipeline.overlap)} where match is 'none'; leave overlap at "
+            "'none', or choose a matcher"
+        )
 
 
 def check_match(match: Any, estimate: Any) -> None:
-    """Refuse an estimator that needs what the matcher does not give."""
+    """Refuse an estimator that needs what the matcher does not give; a plain function does not tell, and is trusted."""
+    if isinstance(match, _FUNCTIONS) and not hasattr(match, "gives"):
+        return
     given = _words(match, "gives")
     lacking = _words(estimate, "needs") - given - {"image"}
     if not lacking:
@@ -140,6 +151,8 @@ def _words(stage: Any, attribute: str) -> frozenset[str]:
 
 
 def _label(stage: Any) -> str:
+    if isinstance(stage, _FUNCTIONS):
+        return str(getattr(stage, "__name__", type(stage).__name__))
     registered = registry.name_of(stage)
     return f'{type(stage).__name__} ("{registered}")' if registered else type(stage).__name__
 

@@ -21,6 +21,7 @@ from hybridreg.matches import Correspondences, Overlap, Pose
 from hybridreg.pair import Pair
 from hybridreg.resolution import tolerance
 from hybridreg.result import RegistrationResult
+from hybridreg.returned import checked
 from hybridreg.runtime import optional_packages
 from hybridreg.runtime.resources import Clock, peak_memory_mb, reset_peak_memory
 from hybridreg.scene import Scene
@@ -173,7 +174,7 @@ class Pipeline(Stage):
         rng = np.random.default_rng([seed, zlib.crc32(pair.id.encode())])
         clock = Clock()
         with clock.phase("downsample"):
-            scene = replace(self.downsample(pair), clock=clock)
+            scene = replace(checked("downsample", self.downsample, self.downsample(pair)), clock=clock)
         fitting.check_scene(scene)
         for name, cloud in (("source", scene.pair.source), ("target", scene.pair.target)):
             if len(cloud.seen.places) != 1:
@@ -183,16 +184,18 @@ class Pipeline(Stage):
                     f"{cloud.dropped} points of the {name} were missing (not finite, or at 0, 0, 0) and were dropped"
                 )
         with clock.phase("overlap"):
-            overlap = self.overlap(scene)
+            overlap = checked("overlap", self.overlap, self.overlap(scene), scene)
         with clock.phase("match"):
             if matches is None:
-                found = scene.matched(self.match(scene, overlap))
+                found = scene.matched(checked("match", self.match, self.match(scene, overlap)))
             else:
                 found = scene.matched(lower_matches(matches, pair))
         with clock.phase("estimate"):
-            estimated = _proper(self.estimate(scene, found, rng))
+            estimated = _proper(checked("estimate", self.estimate, self.estimate(scene, found, rng), scene))
         with clock.phase("refine"):
-            refined = _proper(self.refine(scene, estimated)) if estimated.found else estimated
+            refined = estimated
+            if estimated.found:
+                refined = _proper(checked("refine", self.refine, self.refine(scene, estimated), scene))
         if not len(found):  # an estimator that runs recipes of its own may have matched
             found = of_most(scene, refined.T)
         return Trace(scene, overlap, found, estimated, refined, clock.seconds)

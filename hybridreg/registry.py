@@ -35,6 +35,7 @@ BUILT_IN = {
     "match.vrhcf": "hybridreg.learned.vrhcf.stage:Vrhcf",
     "estimate.identity": "hybridreg.classical.nothing:Identity",
     "estimate.ransac": "hybridreg.classical.ransac:Ransac",
+    "estimate.ransac-50k": "hybridreg.classical.ransac_50k:Ransac50k",
     "estimate.svd": "hybridreg.classical.svd:WeightedSvd",
     "estimate.fgr": "hybridreg.classical.fgr:Fgr",
     "estimate.hcf": "hybridreg.classical.hcf:Hcf",

@@ -26,7 +26,8 @@ def to_table(stage: Any, slot: str | None = None) -> dict[str, Any]:
     """Table of a stage; inside its own slot the short name is enough."""
     registered = registry.name_of(stage)
     if registered is None:
-        name = f"{type(stage).__module__}:{type(stage).__qualname__}"
+        named = stage if hasattr(stage, "__qualname__") else type(stage)
+        name = f"{named.__module__}:{named.__qualname__}"
     else:
         name = registered.removeprefix(f"{slot}.") if slot else registered
     fields = own_params(stage) if dataclasses.is_dataclass(stage) else {}

@@ -63,17 +63,9 @@ def from_pretrained(name_or_folder: str | os.PathLike[str], wanted: str | None =
         shape, no float of 16 bits or more, not finite, or a weight of zeros only: it is named.
     """
     folder = _find(name_or_folder)
-    try:
-        name, values = _split(read_json(folder / CONFIG_FILE))
-    except ValueError as error:
-        raise ValueError(f"{folder / CONFIG_FILE} is damaged: {error}") from error
-    if wanted is not None and name != wanted:
-        raise ValueError(f"{folder} holds weights of the network {name!r}, not of {wanted!r}")
-    cls = network_class(name)
-    try:
-        config = cls.config_type.from_dict(values)
-    except (ValueError, TypeError, ArithmeticError) as error:
-        raise ValueError(f"{folder / CONFIG_FILE} is damaged: {error}") from error
+    cls, config = _read_config(folder)
+    if wanted is not None and cls.name != wanted:
+        raise ValueError(f"{folder} holds weights of the network {cls.name!r}, not of {wanted!r}")
     try:
         tensors = load_file(folder / WEIGHTS_FILE)
     except SafetensorError as error:
@@ -81,6 +73,20 @@ def from_pretrained(name_or_folder: str | os.PathLike[str], wanted: str | None =
     network = cls(config)
     load_tensors(network, tensors, str(folder / WEIGHTS_FILE))
     return network.eval()
+
+
+def read_config(name_or_folder: str | os.PathLike[str]) -> Any:
+    """The configuration of a network's weights, without reading these; errors as `from_pretrained`."""
+    return _read_config(_find(name_or_folder))[1]
+
+
+def _read_config(folder: Path) -> tuple[type[Pretrained], Any]:
+    try:
+        name, values = _split(read_json(folder / CONFIG_FILE))
+        cls = network_class(name)
+        return cls, cls.config_type.from_dict(values)
+    except (ValueError, TypeError, ArithmeticError) as error:
+        raise ValueError(f"{folder / CONFIG_FILE} is damaged: {error}") from error
 
 
 def _split(values: Any) -> tuple[str, dict[str, Any]]:

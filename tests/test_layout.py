@@ -22,6 +22,7 @@ ORDER = (
         "matches",
         "pair",
         "resolution",
+        "returned",
         "scene",
         "slots",
         "stage",

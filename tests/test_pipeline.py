@@ -82,6 +82,65 @@ def test_a_pose_that_is_none_is_a_failure_not_a_crash(
     assert np.array_equal(result.transformation, np.eye(4))
 
 
+def match_by_hand(scene: Scene, overlap: Overlap) -> Correspondences:
+    """A plain function as a stage."""
+    return testing.true_matches(scene, testing.sample_scene()[1], n=50)
+
+
+def test_plain_functions_are_stages_in_every_slot(courtyard: tuple[hr.Pair, np.ndarray]) -> None:
+    pair, truth = courtyard
+    pipe = hr.Pipeline(
+        downsample=lambda pair: Scene.on_cells(pair, 0.5),
+        overlap=lambda scene: Overlap.full(len(scene.source), len(scene.target)),
+        match=match_by_hand,
+        estimate=hr.Ransac().__call__,
+        refine=lambda scene, pose: pose,
+    )
+    result = pipe.run(pair)
+    assert se3.angle_deg(result.transformation[:3, :3].T @ truth[:3, :3]) < 1.0
+    assert result.spec["match"]["stage"] == f"{__name__}:match_by_hand"
+
+
+@pytest.mark.parametrize(
+    ("slot", "answer", "words"),
+    [
+        ("downsample", None, "downsample: .* returned nothing where Scene is due"),
+        ("overlap", np.ones(3), r"overlap: .* returned ndarray of shape \(3,\) where Overlap is due"),
+        (
+            "overlap",
+            Overlap(np.ones(3), np.ones(3)),
+            r"overlap of shape \(3,\) for the \d+ points of the source",
+        ),
+        ("match", (np.eye(3), np.eye(3)), "match: .* returned tuple where Correspondences is due"),
+        ("estimate", np.eye(4), r"estimate: .* returned ndarray of shape \(4, 4\) where Pose is due"),
+        ("refine", None, "refine: .* returned nothing where Pose is due; hybridreg.Pose"),
+    ],
+)
+def test_a_wrong_return_is_told_in_words(
+    courtyard: tuple[hr.Pair, np.ndarray], slot: str, answer: Any, words: str
+) -> None:
+    def wrong(*_: Any) -> Any:
+        return answer
+
+    with pytest.raises(ValueError, match=words):
+        identity(**{"voxel": None if slot == "downsample" else 0.5, slot: wrong}).run(courtyard[0])
+
+
+def test_a_probability_out_of_range_is_told(courtyard: tuple[hr.Pair, np.ndarray]) -> None:
+    def wild(scene: Scene) -> Overlap:
+        return Overlap(np.full(len(scene.source), 2.0), np.ones(len(scene.target)))
+
+    with pytest.raises(ValueError, match=r"overlap: wild .* source that leaves \[0, 1\]"):
+        hr.Pipeline(voxel=0.5, overlap=wild).run(courtyard[0])
+
+
+def test_a_mask_that_nothing_looks_at_is_refused() -> None:
+    with pytest.raises(ValueError, match="nothing looks at the mask of Visibility"):
+        identity(overlap="visibility")
+    with pytest.raises(ValueError, match="choose a matcher"):
+        hr.Pipeline.preset("kiss-gicp").swap(overlap="visibility")
+
+
 def test_random_numbers_depend_on_seed_and_pair_alone(courtyard: tuple[hr.Pair, np.ndarray]) -> None:
     pair, prophet = courtyard[0], Prophet()
     pipe = identity(estimate=prophet, voxel=0.5)

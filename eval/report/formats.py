@@ -14,7 +14,7 @@ from hybridreg.eval.run.controls import MARK
 from hybridreg.eval.score import differences
 from hybridreg.eval.score.protocols import Protocol
 from hybridreg.eval.score.scoring import scene_of
-from hybridreg.eval.table_run import Table
+from hybridreg.eval.table import Table
 from hybridreg.io.csv_cells import cell
 
 _LATEX = {"\\": r"\textbackslash{}", "°": r"$^\circ$", "–": "--"} | {c: f"\\{c}" for c in "&%$#_{}"}

@@ -15,8 +15,8 @@ from hybridreg.data.dataset import ids_of
 from hybridreg.eval.report import stage_pictures
 from hybridreg.eval.run.controls import Control
 from hybridreg.eval.score.protocols import Protocol
+from hybridreg.eval.table import Entry, Table
 from hybridreg.eval.table_file import slug
-from hybridreg.eval.table_run import Entry, Table
 from hybridreg.frames import lower_pose
 from hybridreg.pair import LabelledPair
 from hybridreg.pipeline import Pipeline, Trace

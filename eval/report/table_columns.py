@@ -36,6 +36,7 @@ def results(name: str, score: Score) -> Cells:
     return {
         **cells,
         "inliers %": percent(score.inlier_ratio),
+        "inliers % filtered": percent(score.inlier_ratio_filtered),
         "FMR %": percent(score.fmr),
         "recall % unrefined": percent(score.recall_estimated),
         "no pose": f"{score.n_failed} of {score.n}",

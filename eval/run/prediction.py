@@ -141,7 +141,7 @@ def predict_pair(
         told, pair = method.told(labelled) if isinstance(method, Control) else (method, labelled.pair)
         tried = attempt(told, pair, seed)
         try:
-            return truth.row(index, labelled, tried)
+            return truth.row(index, labelled, tried, match=getattr(told, "match", None))
         except Exception as error:
             return Row(index=index, id=name, error=f"the answer could not be measured: {one_line(error)}")
 

@@ -45,8 +45,10 @@ class Row:
     overlap : share of source points that the target saw too, under the truth, within `overlap_radius` metres
     moments : 4x4
         Second moments of those source points (`metrics.second_moments`).
-    inlier_ratio : share of right matches by radius in metres, as text
+    inlier_ratio : share of right matches by radius in metres, as text, before the matcher's filters
+    inlier_ratio_filtered : the same after them, where they leave something out
     mask : precision, recall, f1 and iou of the overlap stage's mask, where it made one
+    mask_threshold : probability above which the match stage takes a point, and the mask was scored
     """
 
     index: int
@@ -69,7 +71,9 @@ class Row:
     overlap_radius: float | None = None
     moments: Matrix | None = None
     inlier_ratio: dict[str, float] | None = None
+    inlier_ratio_filtered: dict[str, float] | None = None
     mask: dict[str, float] | None = None
+    mask_threshold: float | None = None
 
     def to_json(self) -> str:
         """One line of strict JSON; numbers that are not finite become null."""

@@ -12,7 +12,7 @@ from hybridreg.eval.run.controls import near, true_overlap
 from hybridreg.eval.run.row import Matrix, Row, matrix
 from hybridreg.eval.score import metrics
 from hybridreg.eval.score.protocols import INLIER_RADII
-from hybridreg.frames import lower_pose
+from hybridreg.frames import lower_pose, raise_matches
 from hybridreg.geometry import se3
 from hybridreg.matches import Correspondences
 from hybridreg.pair import LabelledPair, Pair
@@ -23,9 +23,13 @@ from hybridreg.resolution import default_voxel
 _SAMPLE = 10_000
 
 
-def row(index: int, labelled: LabelledPair, tried: Attempt) -> Row:
-    """The row of a pair: the attempt, and the truth measured against it."""
+def row(index: int, labelled: LabelledPair, tried: Attempt, match: Any = None) -> Row:
+    """The row of a pair: the attempt, and the truth measured against it.
+
+    ``match`` is the pipeline's match stage, which tells where it cuts the mask, and matches without its filters.
+    """
     pair = labelled.pair
+    cut = mask_threshold(match)
     return Row(
         index=index,
         id=pair.id,
@@ -39,9 +43,26 @@ def row(index: int, labelled: LabelledPair, tried: Attempt) -> Row:
         offsets=_offsets(pair),
         **_judged(tried),
         **_overlap(labelled),
-        **_matched(tried.matches, labelled.T_target_source),
-        mask=None if tried.trace is None else _mask(tried.trace, labelled),
+        **_matched(tried.matches, _before_filters(tried.trace, match), labelled),
+        mask=None if tried.trace is None else _mask(tried.trace, labelled, cut),
+        mask_threshold=cut,
     )
+
+
+def mask_threshold(match: Any) -> float:
+    """The probability of overlap above which a match stage takes a point; 0.5 where it does not tell."""
+    own = getattr(match, "mask_threshold", None)
+    fixed = own() if callable(own) else getattr(match, "min_overlap", None)
+    return 0.5 if fixed is None else float(fixed)
+
+
+def _before_filters(trace: Trace | None, match: Any) -> Correspondences | None:
+    # Run a second time, as the pose must come from what the stage gave; the encoding is there already.
+    unfiltered = getattr(match, "unfiltered", None)
+    stage = unfiltered() if trace is not None and callable(unfiltered) else None
+    if trace is None or stage is None:
+        return None
+    return raise_matches(stage(trace.scene, trace.overlap), trace.scene.pair)
 
 
 def _lowered(T: Any, pair: Pair) -> Matrix | None:
@@ -98,21 +119,30 @@ def _overlap(labelled: LabelledPair) -> dict[str, Any]:
     }
 
 
-def _matched(matches: Correspondences | None, truth: metrics.Array) -> dict[str, Any]:
+def _matched(
+    matches: Correspondences | None, unfiltered: Correspondences | None, labelled: LabelledPair
+) -> dict[str, Any]:
     if matches is None:
         return {}
+    kept = _right(matches, labelled.T_target_source)
+    if unfiltered is None:
+        return {"n_matches": len(matches), "inlier_ratio": kept}
+    before = _right(unfiltered, labelled.T_target_source)
+    return {"n_matches": len(matches), "inlier_ratio": before, "inlier_ratio_filtered": kept}
+
+
+def _right(matches: Correspondences, truth: metrics.Array) -> dict[str, float]:
     residuals = metrics.match_residuals(matches.source, matches.target, truth)
-    ratio = {
+    return {
         f"{radius:g}": float(np.mean(residuals < radius)) if len(residuals) else 0.0
         for radius in INLIER_RADII
     }
-    return {"n_matches": len(matches), "inlier_ratio": ratio}
 
 
-def _mask(trace: Trace, labelled: LabelledPair) -> dict[str, float] | None:
+def _mask(trace: Trace, labelled: LabelledPair, threshold: float) -> dict[str, float] | None:
     # A mask that keeps every point is no prediction.
     predicted = np.concatenate([trace.overlap.source, trace.overlap.target])
     if np.all(predicted == 1.0):
         return None
     truth = true_overlap(trace.scene, lower_pose(labelled.T_target_source, labelled.pair))
-    return metrics.mask_scores(predicted > 0.5, np.concatenate(truth))._asdict()
+    return metrics.mask_scores(predicted > threshold, np.concatenate(truth))._asdict()

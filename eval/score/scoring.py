@@ -33,8 +33,9 @@ class Score:
     rre_deg_ok, rte_m_ok : means over successes
     rre_deg_criterion, rte_m_criterion : each over the pairs that meet that error's own threshold
     rre_deg_median, rte_m_median : over all pairs
-    inlier_ratio, fmr : mean share of right matches, and share of pairs with at least 5 % of them; NaN for a
-        method that makes no matches
+    inlier_ratio, fmr : mean share of right matches before any filter, and share of pairs with at least 5 % of them;
+        NaN for a method that makes no matches
+    inlier_ratio_filtered : mean share of right matches among those that the pose was estimated from
     recall_estimated : recall of the poses before refinement; NaN where a method does not tell them
     recall_at : recall at fixed thresholds, by their text
     mask_f1 : mean F1 of the overlap masks; NaN without them
@@ -57,6 +58,7 @@ class Score:
     rre_deg_median: float
     rte_m_median: float
     inlier_ratio: float
+    inlier_ratio_filtered: float
     fmr: float
     recall_estimated: float
     recall_at: dict[str, float]
@@ -103,6 +105,7 @@ def score(rows: Sequence[Row], protocol: Protocol) -> Score:
         recall_high=high,
         **_averages(measured, success, protocol),
         inlier_ratio=_mean(ratios),
+        inlier_ratio_filtered=_mean(inlier_ratios(rows, protocol, filtered=True)),
         fmr=_mean((ratios >= _MATCHED).astype(np.float64)),
         recall_estimated=_recall(rows, protocol, "estimated"),
         recall_at={f"{r:g}°, {t:g} m": float(measured.within(r, t).mean()) for r, t in RECALL_AT},
@@ -127,19 +130,25 @@ def identity(rows: Sequence[Row]) -> list[Row]:
     ]  # fmt: skip
 
 
-def inlier_ratios(rows: Sequence[Row], protocol: Protocol) -> Array:
+def inlier_ratios(rows: Sequence[Row], protocol: Protocol, *, filtered: bool = False) -> Array:
     """Share of right matches of each row at the protocol's radius; empty for a method that makes no matches.
+
+    Of all that the features gave, or ``filtered``, of those that the matcher let through.
 
     A pair at which a method that matches has found none counts as 0.
     """
     key = f"{protocol.inlier_m:g}"
     if not any(row.n_matches for row in rows):
         return np.zeros(0)
-    stored = [row.inlier_ratio for row in rows if row.inlier_ratio]
+    told = [(filtered and row.inlier_ratio_filtered) or row.inlier_ratio for row in rows]
+    stored = [ratio for ratio in told if ratio]
     lacking = next((ratio for ratio in stored if key not in ratio), None)
     if lacking is not None:
         raise ValueError(f"inlier ratios are stored at {', '.join(lacking)} m, not at {key} m; predict again")
-    return np.array([(row.inlier_ratio or {}).get(key, 0.0) for row in rows if row.T_true is not None])
+    ratios = [
+        (ratio or {}).get(key, 0.0) for ratio, row in zip(told, rows, strict=True) if row.T_true is not None
+    ]
+    return np.array(ratios)
 
 
 def mean_seconds(rows: Sequence[Row]) -> dict[str, float]:

@@ -15,8 +15,8 @@ if TYPE_CHECKING:
 
     from hybridreg.eval.report.table_columns import Cells
     from hybridreg.eval.score.protocols import Protocol
+    from hybridreg.eval.table import Table
     from hybridreg.eval.table_file import Recipe
-    from hybridreg.eval.table_run import Table
     from hybridreg.pair import LabelledPair
 
 

@@ -128,10 +128,15 @@ class VgamConfig:
     point_position: Literal["none", "mlp", "radial"] = "radial"
     pool: int = 2
     gated: bool = False  # residual gates that start at 0: step 0 equals the network without an image
+    # Each attention followed by LayerNorm and a two-layer network, as GeoTransformer's layers are; or the paper's bare
+    # equations, which divide by the root of the fine features' width.
+    formula: Literal["layers", "text"] = "layers"
 
     def __post_init__(self) -> None:
         limits.within(self, 1, _WIDEST, "heads", "pool")
         limits.within(self, 0, _MOST_BLOCKS, "repeats")
+        if self.gated and self.formula == "text":
+            raise ValueError("vgam: the paper's text has no gate; leave out gated=True or formula='text'")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -170,6 +175,9 @@ class MatchingConfig:
 
     superpoint_matches: int = 256
     dual_normalization: bool = True
+    similarity: Literal["unit", "raw"] = (
+        "unit"  # of features of length one, or as printed; training knows unit alone
+    )
     temperature: float = 1.0
     max_superpoints: int = 800  # a cloud; more are masked out, so that memory stays bounded
     matching_radius: float = 0.5  # metres

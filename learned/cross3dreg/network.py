@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import copy
 import os
 from dataclasses import replace
 from typing import ClassVar, Literal
@@ -16,6 +17,7 @@ from hybridreg.learned.cross3dreg.batch import Batch
 from hybridreg.learned.cross3dreg.config import NetworkConfig, OmpConfig
 from hybridreg.learned.cross3dreg.encodings import CloudEncoding, Encoding, Known, Output
 from hybridreg.learned.cross3dreg.image_encoder import ImageEncoder
+from hybridreg.learned.cross3dreg.kept_points import believed, owning, voters
 from hybridreg.learned.cross3dreg.overlap_predictor import OverlapLogits, OverlapPredictor
 from hybridreg.learned.cross3dreg.sizes import SIZES, named_config
 from hybridreg.learned.cross3dreg.superpoint_evidence import superpoint_evidence
@@ -27,12 +29,12 @@ from hybridreg.learned.layers.kpconv_blocks import pad_row
 from hybridreg.learned.matching.consistency import consistent
 from hybridreg.learned.matching.patch_pairs import PatchPairs, pair_patches, size_chunks
 from hybridreg.learned.matching.point_matching import PointMatches, gather_matches
-from hybridreg.learned.matching.point_similarity import PointSimilarity, Voters, compare_points
+from hybridreg.learned.matching.point_similarity import PointSimilarity, compare_points
 from hybridreg.learned.matching.sinkhorn import OptimalTransport
 from hybridreg.learned.matching.superpoint_matching import SuperpointMatches, match_superpoints
 from hybridreg.learned.memory_estimate import forward_bytes
 from hybridreg.learned.pretrained import Pretrained
-from hybridreg.learned.pyramid.patches import Patches, build_patches
+from hybridreg.learned.pyramid.patches import build_patches
 from hybridreg.learned.pyramid.point_pyramid import Pyramid
 from hybridreg.learned.weights import load_official_tensors
 
@@ -69,12 +71,18 @@ class RegistrationNetwork(Pretrained):
         if image is not None and config.omp is not None:
             self.omp = OverlapPredictor(config.omp, config.backbone.coarse_dim, image.dim)
         if image is not None and config.vgam is not None:
-            self.vgam = VisualGeometricAttention(config.vgam, hidden, image.dim)
+            self.vgam = VisualGeometricAttention(config.vgam, hidden, image.dim, config.backbone.fine_dim)
 
     @classmethod
     def seeded(cls, config: NetworkConfig, seed: int) -> RegistrationNetwork:
         """A network of random weights; the seed turns the kernel points."""
         return cls(config, seed)
+
+    def configured(self, config: NetworkConfig) -> RegistrationNetwork:
+        """The same network, its tensors shared, under a configuration that differs in nothing they were built by."""
+        view = copy.copy(self)
+        view.config = config
+        return view
 
     def forward(self, batch: Batch) -> Output:
         """Match a pair: encode, predict the overlap, attend, match superpoints, match points."""
@@ -153,7 +161,8 @@ class RegistrationNetwork(Pretrained):
         return choose(cloud.patches, probability, self.config.omp or OmpConfig(), limit)
 
     def attend(self, encoding: Encoding, kept: tuple[Kept, Kept]) -> tuple[Tensor, Tensor]:
-        """Unit features (m, d), (n, d) of the kept superpoints after VGAM and the GeoTransformer block."""
+        """Features (m, d), (n, d) of the kept superpoints after VGAM and the GeoTransformer block; of length one, but
+        out of training where ``MatchingConfig.similarity`` is "raw"."""
         features, points = [], []
         for cloud, keep in zip((encoding.target, encoding.source), kept, strict=True):
             at = cloud.nodes[keep.index]
@@ -163,6 +172,8 @@ class RegistrationNetwork(Pretrained):
             features.append(projected)
             points.append(at)
         target, source = self.transformer(features[0], features[1], points[0], points[1])
+        if self.config.matching.similarity == "raw" and not self.training:
+            return target, source
         return F.normalize(target, dim=1), F.normalize(source, dim=1)
 
     def match(
@@ -175,25 +186,20 @@ class RegistrationNetwork(Pretrained):
     ) -> tuple[SuperpointMatches, PointMatches]:
         """Superpoint and point matches of the kept superpoints with their attended features.
 
-        ``filtered`` false keeps matches that do not move with the others, whatever the configuration says.
+        ``filtered`` false keeps all of them, whatever the configuration says: those that are not unique, that the mask
+        doubts, and that do not move with the others.
         """
         similarity = self.compare_points(encoding, kept)
         superpoints = self.match_superpoints(encoding, kept, features, similarity)
-        matches = self._believed(encoding, kept, self.match_points(encoding, superpoints, similarity))
+        matches = self.match_points(encoding, superpoints, similarity, filtered=filtered)
+        if not filtered:
+            return superpoints, matches
+        doubted = 0.0 if self.config.omp is None else self.config.omp.doubted
+        matches = believed(encoding, kept, matches, doubted)
         reach = self.config.matching.consistency
-        if filtered and reach is not None:
+        if reach is not None:
             matches = matches.only(consistent(matches.target, matches.source, matches.weight, reach))
         return superpoints, matches
-
-    def _believed(self, encoding: Encoding, kept: tuple[Kept, Kept], matches: PointMatches) -> PointMatches:
-        # Without the share of the matches whose ends the mask believes least to lie in the overlap.
-        doubted = 0.0 if self.config.omp is None else self.config.omp.doubted
-        target, source = kept[0].probability, kept[1].probability
-        if doubted == 0.0 or len(matches) == 0 or target is None or source is None:
-            return matches
-        owners = (encoding.target.patches.owner, encoding.source.patches.owner)
-        both = target[owners[0][matches.target_index]] * source[owners[1][matches.source_index]]
-        return matches.only(both >= both.quantile(doubted))
 
     def compare_points(self, encoding: Encoding, kept: tuple[Kept, Kept]) -> PointSimilarity | None:
         """The fine points of the kept superpoints held against each other; None where that is not wanted."""
@@ -201,7 +207,7 @@ class RegistrationNetwork(Pretrained):
         if temperature is None:
             return None
         clouds = zip((encoding.target, encoding.source), kept, strict=True)
-        target, source = (_voters(cloud, keep) for cloud, keep in clouds)
+        target, source = (voters(cloud, keep) for cloud, keep in clouds)
         return compare_points(target, source, temperature)
 
     def match_superpoints(
@@ -212,8 +218,8 @@ class RegistrationNetwork(Pretrained):
         similarity: PointSimilarity | None = None,
     ) -> SuperpointMatches:
         """Pairs of kept superpoints that own fine points, best first, as indices into all superpoints."""
-        target = _owning(encoding.target.patches, kept[0])
-        source = _owning(encoding.source.patches, kept[1])
+        target = owning(encoding.target.patches, kept[0])
+        source = owning(encoding.source.patches, kept[1])
         config = self.config.matching
         found = match_superpoints(
             features[0][target],
@@ -221,6 +227,7 @@ class RegistrationNetwork(Pretrained):
             config.superpoint_matches,
             dual=config.dual_normalization,
             temperature=config.temperature,
+            unit=config.similarity == "unit",
             votes=None if similarity is None else similarity.votes[target][:, source],
         )
         target_index, source_index = kept[0].index[target][found.target], kept[1].index[source][found.source]
@@ -250,18 +257,22 @@ class RegistrationNetwork(Pretrained):
         return torch.bmm(target, source.transpose(1, 2)) / scale
 
     def match_points(
-        self, encoding: Encoding, superpoints: SuperpointMatches, similarity: PointSimilarity | None = None
+        self,
+        encoding: Encoding,
+        superpoints: SuperpointMatches,
+        similarity: PointSimilarity | None = None,
+        *,
+        filtered: bool = True,
     ) -> PointMatches:
-        """Point correspondences of the matched superpoints' patches, those that are unique enough."""
+        """Point correspondences of the matched superpoints' patches; ``filtered``, those that are unique enough."""
         config = self.config.matching
         chunks = size_chunks(self.pair_up(encoding, superpoints.target, superpoints.source))
         blocks = [(chunk, self.assign(encoding, chunk, config.sinkhorn_form)) for chunk in chunks]
         matches = gather_matches(blocks, encoding.target.points, encoding.source.points, config)
         if similarity is not None:
             unique = similarity.uniqueness(matches.target_index, matches.source_index)
-            matches = replace(matches, weight=(matches.weight * unique).sqrt()).only(
-                unique > config.uniqueness
-            )
+            matches = replace(matches, weight=(matches.weight * unique).sqrt())
+            matches = matches.only(unique > config.uniqueness) if filtered else matches
         return matches
 
     def memory(self, batch: Batch) -> int:
@@ -284,13 +295,3 @@ class RegistrationNetwork(Pretrained):
         network = cls(named_config(size) if isinstance(size, str) else size)
         load_official_tensors(network, tensors, str(path))
         return network.eval()
-
-
-def _voters(cloud: CloudEncoding, kept: Kept) -> Voters:
-    place = torch.full((len(cloud.nodes),), -1, dtype=torch.int64, device=cloud.nodes.device)
-    place[kept.index] = torch.arange(len(kept.index), device=place.device)
-    return Voters(cloud.point_features, place[cloud.patches.owner], len(kept.index))
-
-
-def _owning(patches: Patches, kept: Kept) -> Tensor:
-    return patches.occupied[kept.index].nonzero()[:, 0]

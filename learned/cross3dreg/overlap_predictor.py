@@ -28,8 +28,8 @@ class OverlapPredictor(nn.Module):
     """Superpoint features query the image's tokens; one probability each. Both clouds share the weights.
 
     ``formula="figure"`` is the paper's drawing (a post-norm transformer block), ``"text"`` its equation
-    ``MLP(A + FFN(A + X))``. ``cross_cloud`` lets each cloud look at the other first, without which there is
-    nothing to go by when there is no image.
+    ``MLP(A + FFN(A + X))``, in which no LayerNorm stands. ``cross_cloud`` lets each cloud look at the other first,
+    without which there is nothing to go by when there is no image.
     """
 
     def __init__(self, config: OmpConfig, point_dim: int, image_dim: int) -> None:
@@ -37,7 +37,7 @@ class OverlapPredictor(nn.Module):
         self.config = config
         dim = config.dim
         self.point = nn.Linear(point_dim + (superpoint_evidence.SIZE if config.evidence else 0), dim)
-        self.point_norm = nn.LayerNorm(dim)
+        self.point_norm = nn.LayerNorm(dim) if config.formula == "figure" else nn.Identity()
         self.cross = AttentionLayer(dim, config.heads) if config.cross_cloud else None
         self.token = nn.Conv2d(image_dim, dim, 3, padding=1)
         self.null = nn.Linear(image_dim, dim)

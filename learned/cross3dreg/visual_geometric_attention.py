@@ -21,22 +21,29 @@ from hybridreg.learned.layers.positions import PointPosition, image_grid_encodin
 
 
 class VisualAttention(nn.Module):
-    """``softmax((Q + E)(K + G)^T / sqrt(c)) (V + G)``: positions enter score and value (methods 6.3)."""
+    """``softmax((Q + E)(K + G)^T / sqrt(c)) (V + G)``: positions enter score and value (methods 6.3).
 
-    def __init__(self, dim: int, heads: int) -> None:
+    c is the width of a head, or ``scale``; ``mix`` false leaves out the linear layer behind the heads.
+    """
+
+    def __init__(self, dim: int, heads: int, *, scale: int | None = None, mix: bool = True) -> None:
         super().__init__()
         self.heads = heads
+        self.scale = math.sqrt(dim // heads if scale is None else scale)
         self.query, self.key, self.value = nn.Linear(dim, dim), nn.Linear(dim, dim), nn.Linear(dim, dim)
         self.point, self.pixel = nn.Linear(dim, dim), nn.Linear(dim, dim)
-        self.linear = nn.Linear(dim, dim)
+        self.linear = nn.Linear(dim, dim) if mix else nn.Identity()
 
     def forward(self, features: Tensor, tokens: Tensor, at_points: Tensor, at_tokens: Tensor) -> Tensor:
         """Features (n, d) and tokens (L, d) with their encodings (n, d), (L, d) to (n, d)."""
         pixel = self.pixel(at_tokens)
         query = split_heads(self.query(features) + self.point(at_points), self.heads)
         key = split_heads(self.key(tokens) + pixel, self.heads)
-        weights = torch.softmax(query @ key.transpose(1, 2) / math.sqrt(query.shape[2]), dim=-1)
-        return self.linear(merge_heads(weights @ split_heads(self.value(tokens) + pixel, self.heads)))
+        weights = torch.softmax(query @ key.transpose(1, 2) / self.scale, dim=-1)
+        mixed: Tensor = self.linear(
+            merge_heads(weights @ split_heads(self.value(tokens) + pixel, self.heads))
+        )
+        return mixed
 
 
 class GatedResidual(nn.Module):
@@ -89,16 +96,37 @@ class VisualLayer(nn.Module):
         return self.self_attention(features, features)
 
 
-class VisualGeometricAttention(nn.Module):
-    """N repeats of the visual layer on each cloud, the weights shared by both."""
+class PrintedLayer(nn.Module):
+    """The paper's equations and nothing else: ``F' = S (V + G) + F``, then ``F'' = softmax(Q K^T / sqrt(d')) V + F'``,
+    where d' is the width of the fine features."""
 
-    def __init__(self, config: VgamConfig, dim: int, image_dim: int) -> None:
+    def __init__(self, dim: int, heads: int, fine_dim: int) -> None:
+        super().__init__()
+        self.visual = VisualAttention(dim, heads, scale=fine_dim, mix=False)
+        self.self_attention = Attention(dim, heads, scale=fine_dim)
+
+    def forward(self, features: Tensor, tokens: Tensor, at_points: Tensor, at_tokens: Tensor) -> Tensor:
+        """(n, d) to (n, d)."""
+        seen: Tensor = self.visual(features, tokens, at_points, at_tokens) + features
+        return self.self_attention(seen, seen) + seen
+
+
+class VisualGeometricAttention(nn.Module):
+    """N repeats of the visual layer on each cloud, the weights shared by both.
+
+    ``fine_dim`` is the width of the fine features; the paper's text scales by it.
+    """
+
+    def __init__(self, config: VgamConfig, dim: int, image_dim: int, fine_dim: int) -> None:
         super().__init__()
         self.pool = config.pool
         self.token = nn.Linear(image_dim, dim)
         self.position = PointPosition(dim, config.point_position)
         self.layers = nn.ModuleList(
-            VisualLayer(dim, config.heads, config.gated) for _ in range(config.repeats)
+            PrintedLayer(dim, config.heads, fine_dim)
+            if config.formula == "text"
+            else VisualLayer(dim, config.heads, config.gated)
+            for _ in range(config.repeats)
         )
 
     def forward(self, features: Tensor, points: Tensor, image: ImageFeatures) -> Tensor:
@@ -115,4 +143,4 @@ class VisualGeometricAttention(nn.Module):
             return token, torch.zeros_like(token)
         tokens, height, width = pool_tokens(image.grid, self.pool)
         tokens = self.token(tokens)
-        return tokens, image_grid_encoding(height, width, tokens.shape[1], tokens.device)
+        return tokens, image_grid_encoding(height, width, tokens.shape[1], tokens.device).to(tokens.dtype)

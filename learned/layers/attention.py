@@ -22,11 +22,15 @@ def merge_heads(features: Tensor) -> Tensor:
 
 
 class Attention(nn.Module):
-    """Multi-head attention; with ``geometric`` the score gains ``q_i . W_p r_ij`` (methods 6.6)."""
+    """Multi-head attention; with ``geometric`` the score gains ``q_i . W_p r_ij`` (methods 6.6).
 
-    def __init__(self, dim: int, heads: int, *, geometric: bool = False) -> None:
+    Scores are divided by the root of a head's width, or of ``scale`` where that is given.
+    """
+
+    def __init__(self, dim: int, heads: int, *, geometric: bool = False, scale: int | None = None) -> None:
         super().__init__()
         self.heads = heads
+        self.scale = math.sqrt(dim // heads if scale is None else scale)
         self.query, self.key, self.value = nn.Linear(dim, dim), nn.Linear(dim, dim), nn.Linear(dim, dim)
         self.structure = nn.Linear(dim, dim) if geometric else None
 
@@ -39,7 +43,7 @@ class Attention(nn.Module):
         scores = query @ key.transpose(1, 2)  # (h, n, m)
         if structure is not None:
             scores = scores + self._structure_scores(query, structure)
-        weights = torch.softmax(scores / math.sqrt(query.shape[2]), dim=-1)
+        weights = torch.softmax(scores / self.scale, dim=-1)
         value = self.value(memory if values is None else values)
         return merge_heads(weights @ split_heads(value, self.heads))
 

@@ -3,7 +3,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import os
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
@@ -19,6 +20,7 @@ from hybridreg.scene import Scene
 from hybridreg.stage import Stage
 
 if TYPE_CHECKING:
+    from hybridreg.learned.cross3dreg.config import LgrConfig
     from hybridreg.learned.matching.local_to_global import LgrEstimate
 
 Array = NDArray[np.float64]
@@ -35,23 +37,27 @@ class Lgr(Stage):
     Parameters
     ----------
     max_distance : float or None
-        Metres; a match agrees with a pose when its residual is smaller. None takes the spacing of the points
-        that were matched where the matcher tells it (twice the voxel of the published networks, as they do), and
-        otherwise twice the scene's spacing.
-    min_group : int
-        Groups of fewer matches propose nothing, but vote.
-    steps : int
-        Fits to the matches that agree.
+        Metres; a match agrees with a pose when its residual is smaller. None takes that of `weights`; without them the
+        spacing of the points that were matched where the matcher tells it (twice the voxel of the published networks,
+        as they do), and otherwise twice the scene's spacing.
+    min_group : int or None
+        Groups of fewer matches propose nothing, but vote. None takes that of `weights`, or 3.
+    steps : int or None
+        Fits to the matches that agree. None takes that of `weights`, or 5.
     max_votes : int or None
-        At most so many matches vote, those of the largest weight.
+        At most so many matches vote, those of the largest weight. None takes that of `weights`; without them all vote.
+    weights : str or None
+        A folder of a network's weights, or the name of shipped ones, whose configuration (`LgrConfig`) fills what is
+        None above: the same numbers as in that network's validation while it was trained.
     rival_share : float in [0, 1]
         A pose far from the best one is a rival when its support is at least this share of the best one's.
     """
 
     max_distance: float | None = None
-    min_group: int = 3
-    steps: int = 5
+    min_group: int | None = None
+    steps: int | None = None
     max_votes: int | None = None
+    weights: str | None = None
     rival_share: float = 0.5
 
     needs: ClassVar[frozenset[str]] = frozenset({"matches", "group"})
@@ -59,9 +65,11 @@ class Lgr(Stage):
     def __post_init__(self) -> None:
         if self.max_distance is not None and not self.max_distance > 0.0:
             raise ValueError(f"max_distance={self.max_distance} must be a positive length in metres")
-        if self.min_group < 3:
+        if self.weights is not None:
+            object.__setattr__(self, "weights", os.fspath(self.weights))
+        if self.min_group is not None and self.min_group < 3:
             raise ValueError(f"min_group={self.min_group} must be at least 3: fewer matches fix no pose")
-        if self.steps < 1:
+        if self.steps is not None and self.steps < 1:
             raise ValueError(f"steps={self.steps} must be at least 1")
         if self.max_votes is not None and self.max_votes < 1:
             raise ValueError(f"max_votes={self.max_votes} must be at least 1")
@@ -74,9 +82,10 @@ class Lgr(Stage):
         rows = _usable(matches)
         if len(rows) < 3:
             return Pose.unknown(len(matches))
-        max_distance = self.max_distance or matches.spacing or 2.0 * scene.spacing
+        config = self.config(matches.spacing or 2.0 * scene.spacing)
+        max_distance = config.acceptance_radius
         with single():
-            found = self._estimate(scene, matches, rows, max_distance)
+            found = _estimate(scene, matches, rows, config)
             T: Array = found.transform.numpy()
             residual = np.linalg.norm(se3.apply(T, matches.source[rows]) - matches.target[rows], axis=1)
             inliers = np.zeros(len(matches), dtype=bool)
@@ -89,32 +98,24 @@ class Lgr(Stage):
             rivals = self._rivals(matches, rows, T, found.proposals.numpy(), max_distance)
         return Pose(T, inliers=inliers, rivals=rivals)
 
-    def _estimate(
-        self, scene: Scene, matches: Correspondences, rows: Rows, max_distance: float
-    ) -> LgrEstimate:
-        import torch
+    def config(self, spacing: float) -> LgrConfig:
+        """What this stage works with where points are ``spacing`` metres apart.
 
+        Raises
+        ------
+        FileNotFoundError, ValueError
+            `weights` are not there, or of a network that has no such configuration.
+        """
         from hybridreg.learned.cross3dreg.config import LgrConfig
-        from hybridreg.learned.matching.local_to_global import local_to_global
 
-        if matches.group is None:
-            raise ValueError(
-                f"pair {scene.pair.id}: local-to-global estimation needs to know which matches belong together; "
-                f"give the {len(matches)} matches a group (K,), or use an estimator that needs none"
-            )
-        weight = matches.weight[rows] * (_LARGEST_WEIGHT / matches.weight[rows].max())
-        columns = (matches.target[rows], matches.source[rows], weight, matches.group[rows])
-        config = LgrConfig(
-            acceptance_radius=max_distance,
-            min_group=self.min_group,
-            steps=self.steps,
-            max_votes=self.max_votes,
-        )
-        target, source, weights, group = (torch.from_numpy(np.array(column)) for column in columns)
-        found = local_to_global(target, source, weights, group, config)
-        if found.hypotheses == 0:
-            scene.note(f"LGR: no group has {self.min_group} matches, it started from a fit to all of them")
-        return found
+        own = LgrConfig(acceptance_radius=spacing) if self.weights is None else _of_weights(self.weights)
+        given = {
+            "acceptance_radius": self.max_distance,
+            "min_group": self.min_group,
+            "steps": self.steps,
+            "max_votes": self.max_votes,
+        }
+        return replace(own, **{key: value for key, value in given.items() if value is not None})
 
     def _rivals(
         self, matches: Correspondences, rows: Rows, T: Array, proposals: Array, max_distance: float
@@ -130,3 +131,33 @@ class Lgr(Stage):
 def _usable(matches: Correspondences) -> Rows:
     finite = np.isfinite(matches.source).all(axis=1) & np.isfinite(matches.target).all(axis=1)
     return np.flatnonzero(finite & (matches.weight > 0.0) & np.isfinite(matches.weight))
+
+
+def _estimate(scene: Scene, matches: Correspondences, rows: Rows, config: LgrConfig) -> LgrEstimate:
+    import torch
+
+    from hybridreg.learned.matching.local_to_global import local_to_global
+
+    if matches.group is None:
+        raise ValueError(
+            f"pair {scene.pair.id}: local-to-global estimation needs to know which matches belong together; "
+            f"give the {len(matches)} matches a group (K,), or use an estimator that needs none"
+        )
+    weight = matches.weight[rows] * (_LARGEST_WEIGHT / matches.weight[rows].max())
+    columns = (matches.target[rows], matches.source[rows], weight, matches.group[rows])
+    target, source, weights, group = (torch.from_numpy(np.array(column)) for column in columns)
+    found = local_to_global(target, source, weights, group, config)
+    if found.hypotheses == 0:
+        scene.note(f"LGR: no group has {config.min_group} matches, it started from a fit to all of them")
+    return found
+
+
+def _of_weights(weights: str) -> LgrConfig:
+    from hybridreg.learned.weights import read_config
+
+    found: LgrConfig | None = getattr(read_config(weights), "lgr", None)
+    if found is None:
+        raise ValueError(
+            f"Lgr: the weights {weights!r} are of a network that has no local-to-global estimation"
+        )
+    return found

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, ClassVar, Literal
 
 from hybridreg.learned.stages.network_stage import NetworkStage
 from hybridreg.matches import Correspondences, Overlap
@@ -12,6 +12,8 @@ from hybridreg.runtime.threads import single
 from hybridreg.scene import Scene
 
 if TYPE_CHECKING:
+    from typing_extensions import Self
+
     from hybridreg.learned.cross3dreg.network import RegistrationNetwork
     from hybridreg.learned.matching.point_matching import PointMatches
 
@@ -26,12 +28,20 @@ class NetworkMatcher(NetworkStage):
         Superpoints with a lower probability of overlap are left out, unless too few would remain. None takes
         the threshold that the network was trained with.
     filtered : bool
-        Leave out matches that do not move with the others, where the network's configuration has a distance for that
-        (`MatchingConfig.consistency`). Without it the matches are what the features alone say.
+        Leave out matches that are not unique, that the mask doubts and that do not move with the others, where the
+        network's configuration asks for that. Without it the matches are what the features alone say.
+    as_published : bool
+        Match as arXiv 2509.06456 prints it, and GeoTransformer with it, whatever the configuration adds
+        (`hybridreg.learned.cross3dreg.as_published`): no votes, no uniqueness, no filter, the mask cut at 0.5.
+    similarity : "unit", "raw" or None
+        Of superpoints: of their features at length one, as GeoTransformer and our training have it, or as they come, as
+        the paper's equation has it. None takes what the network's configuration says.
     """
 
     min_overlap: float | None = None
     filtered: bool = True
+    as_published: bool = False
+    similarity: Literal["unit", "raw"] | None = None
 
     gives: ClassVar[frozenset[str]] = frozenset({"matches", "group"})
     parts: ClassVar[frozenset[str]] = frozenset({"backbone", "transformer"})
@@ -40,6 +50,37 @@ class NetworkMatcher(NetworkStage):
         super().__post_init__()
         if self.min_overlap is not None and not 0.0 <= self.min_overlap <= 1.0:
             raise ValueError(f"min_overlap={self.min_overlap} must lie in [0, 1]")
+        if self.similarity not in (None, "unit", "raw"):
+            raise ValueError(f"similarity={self.similarity!r} must be 'unit' or 'raw'")
+
+    def configured(self) -> RegistrationNetwork:
+        """The network under the configuration that this stage matches with."""
+        from dataclasses import replace
+
+        from hybridreg.learned.cross3dreg.as_published import as_published
+
+        network: RegistrationNetwork = self.network()
+        config = as_published(network.config) if self.as_published else network.config
+        if self.similarity is not None:
+            config = replace(config, matching=replace(config.matching, similarity=self.similarity))
+        return network.configured(config)
+
+    def mask_threshold(self) -> float:
+        """Above which probability of overlap a superpoint goes on."""
+        from hybridreg.learned.cross3dreg.config import OmpConfig
+
+        if self.min_overlap is not None:
+            return self.min_overlap
+        return (self.configured().config.omp or OmpConfig()).threshold
+
+    def unfiltered(self) -> Self | None:
+        """The same matching without the filters that leave matches out; None where none does."""
+        from dataclasses import replace
+
+        config = self.configured().config
+        matching, doubted = config.matching, 0.0 if config.omp is None else config.omp.doubted
+        active = matching.uniqueness > 0.0 or matching.consistency is not None or doubted > 0.0
+        return replace(self, filtered=False) if self.filtered and active else None
 
     def __call__(self, scene: Scene, overlap: Overlap) -> Correspondences:
         import torch
@@ -47,7 +88,7 @@ class NetworkMatcher(NetworkStage):
         from hybridreg.learned.stages.encoding import encode
         from hybridreg.learned.stages.kept_superpoints import keep
 
-        network: RegistrationNetwork = self.network()
+        network = self.configured()
         encoding = encode(scene, self)
         with single(), torch.inference_mode():
             kept = keep(scene, overlap, encoding, network.config, self.min_overlap)

@@ -22,7 +22,15 @@ class Omp(NetworkStage):
     Each point takes the probability of its superpoint, so that any matcher can use it. A matcher of the same
     weights shares the encoding. Without an image, a network whose OMP does not look at the other cloud knows
     nothing, and every point counts.
+
+    Parameters
+    ----------
+    as_published : bool
+        Insist on the paper's predictor, which looks at the image and at one cloud alone. Random weights are of that
+        kind. Trained ones answer from what they were trained with: where that was more, a note says so.
     """
+
+    as_published: bool = False
 
     image: ClassVar[bool] = True
     parts: ClassVar[frozenset[str]] = frozenset({"backbone", "omp"})
@@ -30,12 +38,19 @@ class Omp(NetworkStage):
     def __call__(self, scene: Scene) -> Overlap:
         import torch
 
+        from hybridreg.learned.cross3dreg.as_published import mask_inputs_of_ours
         from hybridreg.learned.stages.encoding import encode
         from hybridreg.learned.stages.spreading import spread
         from hybridreg.learned.stages.tensor_values import array
 
         network: RegistrationNetwork = self.network()
         encoding = encode(scene, self)
+        ours = mask_inputs_of_ours(network.config) if self.as_published else []
+        if ours:
+            scene.note(
+                f"the mask is not as published: OMP of {self.weights!r} was trained to look at {' and '.join(ours)} "
+                "too; `hybridreg train paper` trains one that does not"
+            )
         with single(), torch.inference_mode():
             logits = network.predict_overlap(encoding)
             assert logits is not None, "check() lets no network without OMP through"

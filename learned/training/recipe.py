@@ -156,6 +156,12 @@ class Recipe:
                 self._check_other(phase)
             elif phase.losses.mask and self.network.omp is None and phase.losses.mask != 1.0:
                 raise ValueError(f"phase {phase.name!r}: a mask loss is weighed, but the network has no OMP")
+        vgam = self.network.vgam if self.kind == DEFAULT else None
+        if vgam is not None and vgam.point_position == "radial" and self.augmentation.rotation == "full":
+            raise ValueError(
+                "network.vgam: point_position='radial' means range and height, which augmentation.rotation='full' "
+                "turns into one another; choose point_position='mlp', or rotation='yaw'"
+            )
 
     def _check_other(self, phase: Phase) -> None:
         if phase.losses != LossWeights():

@@ -85,8 +85,11 @@ def _other_network(kind: str, size: str, changes: Mapping[str, Any]) -> Any:
 
 
 def network_of(size: str, *, omp: bool, vgam: bool, changes: Mapping[str, Any]) -> NetworkConfig:
-    """A named configuration with some of its values changed."""
-    merged = _merged(named_config(size, omp=omp, vgam=vgam).to_dict(), changes)
+    """A named configuration with some of its values changed; those of a part that is switched off are left aside, as
+    they come from the recipe that another builds on."""
+    off = {name for name, on in (("omp", omp), ("vgam", vgam)) if not on}
+    kept = {key: value for key, value in changes.items() if key not in off}
+    merged = _merged(named_config(size, omp=omp, vgam=vgam).to_dict(), kept)
     return NetworkConfig.from_dict(merged)
 
 

@@ -15,6 +15,7 @@ from hybridreg.eval.run.row import Row, matrix
 from hybridreg.eval.score import metrics
 from hybridreg.eval.score.protocols import protocol
 from hybridreg.eval.score.scoring import score
+from hybridreg.learned.cross3dreg.config import OmpConfig
 from hybridreg.learned.cross3dreg.network import RegistrationNetwork
 from hybridreg.learned.cross3dreg.targets import Targets
 from hybridreg.learned.matching.local_to_global import local_to_global
@@ -126,7 +127,9 @@ def _matched(network: RegistrationNetwork, sample: Sample, number: int) -> tuple
         arguments = (matches.target.double(), matches.source.double(), matches.weight.double(), matches.group)
         T = local_to_global(*arguments, network.config.lgr).transform.cpu().numpy()
     masks = (
-        [] if output.overlap is None else [_mask_f1(output.overlap.target, output.overlap.source, targets)]
+        []
+        if output.overlap is None
+        else [_mask_f1(output.overlap.target, output.overlap.source, targets, network.config.omp)]
     )
     row = _row(sample, number, matches.source, matches.target, T)
     return row, pair_inlier_ratio(output.superpoints, targets), masks
@@ -156,8 +159,10 @@ def _row(sample: Sample, number: int, source: Tensor, target: Tensor, T: np.ndar
     )
 
 
-def _mask_f1(target: Tensor, source: Tensor, targets: Targets) -> float:
-    predicted = torch.cat([target, source]).cpu().numpy() > 0.0
+def _mask_f1(target: Tensor, source: Tensor, targets: Targets, config: OmpConfig | None) -> float:
+    # At the threshold that the matching applies, so that one number means one thing.
+    threshold = (config or OmpConfig()).threshold
+    predicted = torch.sigmoid(torch.cat([target, source])).cpu().numpy() > threshold
     truth = torch.cat([targets.mask_target, targets.mask_source]).cpu().numpy()
     return metrics.mask_scores(predicted, truth).f1
 

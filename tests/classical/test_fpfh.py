@@ -55,6 +55,30 @@ def test_matches_find_the_pose(turned: Scene) -> None:
     assert np.linalg.norm(error[:3, 3]) < 0.5
 
 
+def test_matches_of_the_same_two_cells_are_a_group(turned: Scene) -> None:
+    matches = Fpfh(cell=6.0)(turned, full(turned))
+    assert matches.group is not None
+    cells = [
+        (*np.floor(p / 6.0).astype(int), *np.floor(q / 6.0).astype(int))
+        for p, q in zip(matches.source, matches.target, strict=True)
+    ]
+    same = np.array([[a == b for b in cells] for a in cells])
+    assert np.array_equal(same, matches.group[:, None] == matches.group[None])
+    finer = Fpfh(cell=2.0)(turned, full(turned)).group
+    assert finer is not None
+    assert finer.max() > matches.group.max()
+
+
+def test_local_to_global_estimation_follows_it(turned: Scene) -> None:
+    pytest.importorskip("torch")
+    from hybridreg.learned.stages.lgr import Lgr
+
+    matches = Fpfh()(turned, full(turned))
+    error = se3.inverse(TURN) @ Lgr()(turned, matches, np.random.default_rng(0)).T
+    assert se3.angle_deg(error[:3, :3]) < 3.0
+    assert np.linalg.norm(error[:3, 3]) < 1.0
+
+
 def test_rows_are_those_of_the_levels_and_unique_both_ways(turned: Scene) -> None:
     matches = Fpfh()(turned, full(turned))
     assert matches.source_index is not None
@@ -125,6 +149,7 @@ def test_features_are_computed_once_a_run(turned: Scene) -> None:
     "fields, message",
     [
         ({"radius": 0.0}, "radius=0.0"),
+        ({"cell": 0.0}, "cell=0.0"),
         ({"ratio": 1.2}, "ratio=1.2"),
         ({"max_neighbours": 2}, "max_neighbours=2"),
         ({"max_points": 0}, "max_points=0"),

@@ -64,30 +64,46 @@ def all_weights(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.usefixtures("all_weights")
-def test_the_ablation_is_the_published_one_and_two_controls() -> None:
-    read = table_file.read("ablation")
-    assert [line.name[:3] for line in read.lines] == ["(a)", "(b)", "(c)", "(d)", "(e)", "(f)"]
-    assert all(line.method is not None for line in read.lines)
-    assert read.lines[4].method.oracle  # type: ignore[union-attr]
-    assert read.lines[4].name.endswith("†")
-    assert not read.lines[5].method.image  # type: ignore[union-attr]
+def test_table_4_stands_as_published_and_ours_with_two_controls_each() -> None:
+    read = table_file.read("table4")
+    letters = ["(a)", "(b)", "(c)", "(d)", "(d)", "(d)"]
+    assert [line.name[:3] for line in read.lines] == 2 * letters
+    methods: list[Any] = [line.method for line in read.lines]
+    for part, published in ((methods[:6], True), (methods[6:], False)):
+        pipelines = [getattr(method, "pipeline", method) for method in part]
+        assert [pipe.match.as_published for pipe in pipelines] == 6 * [published]
+        assert [getattr(pipe.overlap, "as_published", None) for pipe in pipelines[1:5]] == 4 * [published]
+        assert not part[4].image
+        assert part[5].oracle
+        # LGR has the numbers that the weights were validated with in training.
+        for pipe in pipelines:
+            assert pipe.estimate.config(0.3) == pipe.match.network().config.lgr
+    assert all(line.name.endswith("†") for line in (read.lines[5], read.lines[11]))
     assert read.paper is not None
-    # Every printed row has its line, so that the eye finds it.
-    assert list(read.paper.rows) == [line.name for line in read.lines[:4]]
+    # Every printed row has its lines, so that the eye finds them.
+    assert [f"{name}, as published" for name in read.paper.rows] == [line.name for line in read.lines[:4]]
     assert read.paper.rows["(d) OMP, VGAM"] == (6.683, 1.010, 87.2, 70.3)
 
 
 @pytest.mark.usefixtures("all_weights")
-def test_estimators_and_stages_are_whole_grids() -> None:
-    estimators = table_file.read("estimators")
-    assert len(estimators.lines) == 2 * 3 * 2
-    assert all(line.method is not None for line in estimators.lines)
+def test_tables_2_and_3_have_every_printed_row_and_ours_beside() -> None:
+    for name, printed, ours in (("table2", 9, 3), ("table3", 11, 6)):
+        read = table_file.read(name)
+        assert read.paper is not None
+        names = [line.name for line in read.lines]
+        assert names[:printed] == list(read.paper.rows)
+        assert len(names) == printed + ours
+        assert all(line.method is not None for line in read.lines)
+    fifty = [line.method for line in table_file.read("table3").lines if line.name.startswith("RANSAC-50K")]
+    assert {type(method.estimate).__name__ for method in fifty} == {"Ransac50k"}  # type: ignore[union-attr]
+
+
+@pytest.mark.usefixtures("all_weights")
+def test_stages_are_a_whole_grid_and_lgr_follows_fpfh() -> None:
     stages = table_file.read("stages")
     assert len(stages.lines) == 3 * 3 * 3 * 2
-    misfits = [line for line in stages.lines if line.method is None]
-    # FPFH's matches have no groups, which local-to-global estimation needs.
-    assert len(misfits) == 3 * 2
-    assert all("fpfh" in line.name and "lgr" in line.name for line in misfits)
+    assert [line.problem for line in stages.lines if line.method is None] == []
+    assert [line.name for line in stages.lines if "fpfh" in line.name and "lgr" in line.name]
 
 
 @pytest.mark.usefixtures("no_weights")
@@ -95,9 +111,7 @@ def test_rows_without_weights_are_told_not_scored(tmp_path: Path) -> None:
     read = table_file.read("stages")
     assert {line.method is None for line in read.lines} == {True, False}
     missing = [line for line in read.lines if "omp" in line.name or "vgam" in line.name]
-    assert all(
-        "which do not come with this version" in line.problem for line in missing if "lgr" not in line.name
-    )
-    with pytest.raises(ValueError, match="none of 6 lines can be run; the first: .*geotransformer-small"):
-        table_run.run(table_file.read("ablation"), Scattered(1), tmp_path)
+    assert all("which do not come with this version" in line.problem for line in missing)
+    with pytest.raises(ValueError, match="none of 12 lines can be run; the first: .*geotransformer-small"):
+        table_run.run(table_file.read("table4"), Scattered(1), tmp_path)
     assert not list(tmp_path.iterdir())

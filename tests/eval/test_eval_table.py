@@ -17,8 +17,8 @@ from eval_stubs import Moody, RowByRow, Scattered, row
 from hybridreg.eval import PROTOCOLS, read, table_run
 from hybridreg.eval.report import formats, plotly_figures, table_report
 from hybridreg.eval.run.row import Row
+from hybridreg.eval.table import Entry, Table
 from hybridreg.eval.table_file import Line, Recipe
-from hybridreg.eval.table_run import Entry, Table
 
 CROSS, KITTI, PREDATOR = (PROTOCOLS[name] for name in ("cross3dreg", "kitti", "predator"))
 THREE_D = '"hoverinfo":"skip"'

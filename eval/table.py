@@ -1,0 +1,82 @@
+# SPDX-License-Identifier: MIT
+"""Methods side by side on the same pairs, with all that a report tells of them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+from hybridreg.eval.run.row import Row
+from hybridreg.eval.score import scoring
+from hybridreg.eval.score.paper import Printed
+from hybridreg.eval.score.protocols import Protocol
+
+IDENTITY = "identity"
+# In the note of a stage whose network looks at the clouds on a grid of its own (`learned.stages.network_grid`).
+OWN_GRID = "put the clouds on a grid of its own"
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Entry:
+    """One method's rows; `config` is what made them."""
+
+    name: str
+    rows: list[Row]
+    config: dict[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Table:
+    """Methods side by side.
+
+    Attributes
+    ----------
+    entries : the identity first, then the methods
+    starts : turned copies of each pair
+    problems : lines that could not be built or run, with the reason
+    left_out : what some lines did without, for want of a package
+    paper : figures that somebody printed, to be shown apart
+    """
+
+    title: str
+    data: str
+    seed: int
+    starts: int
+    entries: list[Entry]
+    problems: dict[str, str] = field(default_factory=dict)
+    left_out: dict[str, str] = field(default_factory=dict)
+    paper: Printed | None = None
+
+    def remarks(self) -> list[str]:
+        """Sentences on what was not run."""
+        without = (f"{name} ran without {text}" for name, text in self.left_out.items())
+        return [
+            *(f"Not run: {name}. {problem}" for name, problem in self.problems.items()),
+            *without,
+            *self._own_grids(),
+        ]
+
+    def _own_grids(self) -> list[str]:
+        # What a downsampling stage chose does not reach a network that has a grid of its own.
+        names = [
+            e.name for e in self.methods if any(OWN_GRID in note for row in e.rows for note in row.notes)
+        ]
+        told = "What the downsample slot chose did not reach the networks of"
+        return [f"{told} {', '.join(names)}: each {OWN_GRID}"] if names else []
+
+    @property
+    def methods(self) -> list[Entry]:
+        """The entries but the identity."""
+        return [entry for entry in self.entries if entry.name != IDENTITY]
+
+    def scores(self, protocol: Protocol) -> dict[str, scoring.Score]:
+        """Score of every entry that has rows."""
+        return {entry.name: scoring.score(entry.rows, protocol) for entry in self.entries if entry.rows}
+
+    def caption(self, protocol: Protocol) -> str:
+        """Which number is this: the data, the starts, the protocol."""
+        n = max((len(entry.rows) for entry in self.entries), default=0)
+        runs = f"{n} pairs"
+        if self.starts:
+            runs = f"{n // (self.starts + 1)} pairs, each as it is and under {self.starts} random yaw starts, {n} runs"
+        return f"{self.title}. Data {self.data or 'unnamed'}, {runs}; {protocol.describe()}"
