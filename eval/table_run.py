@@ -11,11 +11,11 @@ from typing import Any
 
 from hybridreg.config.plain_values import build
 from hybridreg.data.yaw_starts import YawStarts
+from hybridreg.eval.results import IDENTITY, Entry, Table
 from hybridreg.eval.run import store
 from hybridreg.eval.run.prediction import predict
 from hybridreg.eval.run.row import Row
 from hybridreg.eval.score import paper, scoring
-from hybridreg.eval.table import IDENTITY, Entry, Table
 from hybridreg.eval.table_file import Recipe, slug
 from hybridreg.io import write_json
 from hybridreg.io.lock import folder_lock

@@ -10,11 +10,11 @@ from collections.abc import Sequence
 
 from hybridreg.eval.report import table_columns
 from hybridreg.eval.report.table_columns import Cells
+from hybridreg.eval.results import Table
 from hybridreg.eval.run.controls import MARK
 from hybridreg.eval.score import differences
 from hybridreg.eval.score.protocols import Protocol
 from hybridreg.eval.score.scoring import scene_of
-from hybridreg.eval.table import Table
 from hybridreg.io.csv_cells import cell
 
 _LATEX = {"\\": r"\textbackslash{}", "°": r"$^\circ$", "–": "--"} | {c: f"\\{c}" for c in "&%$#_{}"}

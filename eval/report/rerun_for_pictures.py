@@ -13,9 +13,9 @@ import numpy as np
 from hybridreg.config.plain_values import value_of
 from hybridreg.data.dataset import ids_of
 from hybridreg.eval.report import stage_pictures
+from hybridreg.eval.results import Entry, Table
 from hybridreg.eval.run.controls import Control
 from hybridreg.eval.score.protocols import Protocol
-from hybridreg.eval.table import Entry, Table
 from hybridreg.eval.table_file import slug
 from hybridreg.frames import lower_pose
 from hybridreg.pair import LabelledPair

@@ -14,8 +14,8 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from hybridreg.eval.report.table_columns import Cells
+    from hybridreg.eval.results import Table
     from hybridreg.eval.score.protocols import Protocol
-    from hybridreg.eval.table import Table
     from hybridreg.eval.table_file import Recipe
     from hybridreg.pair import LabelledPair
 

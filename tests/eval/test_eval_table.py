@@ -16,8 +16,8 @@ from eval_stubs import Moody, RowByRow, Scattered, row
 
 from hybridreg.eval import PROTOCOLS, read, table_run
 from hybridreg.eval.report import formats, plotly_figures, table_report
+from hybridreg.eval.results import Entry, Table
 from hybridreg.eval.run.row import Row
-from hybridreg.eval.table import Entry, Table
 from hybridreg.eval.table_file import Line, Recipe
 
 CROSS, KITTI, PREDATOR = (PROTOCOLS[name] for name in ("cross3dreg", "kitti", "predator"))
