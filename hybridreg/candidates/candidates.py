@@ -186,7 +186,7 @@ class Candidates(Stage):
         with scene.clock.phase("refine"):
             moved = PoseEvidence(settled.at.views, self.refine(scene, Pose(settled.T)).T)
         # Along a corridor a refinement may slide away; else it is nearer than what settled, however likely that is.
-        if moved.by_surfaces <= settled.by_surfaces - _NOISE:
+        if moved.by_surfaces <= settled.by_surfaces - _NOISE or np.array_equal(moved.T, settled.T):
             return settled
         return Hypothesis(at=moved, by_surfaces=moved.by_surfaces, came_from=settled.came_from)
 
