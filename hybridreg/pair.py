@@ -12,10 +12,10 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from hybridreg.camera_image import Photograph
 from hybridreg.cloud import PointCloud
 from hybridreg.geometry import se3
 from hybridreg.geometry.viewpoint import Given
+from hybridreg.io.camera_image import Photograph
 
 Array = NDArray[np.float64]
 Gravity = Literal["known", "unknown"]

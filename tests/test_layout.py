@@ -15,7 +15,6 @@ ORDER = (
     ("config", "io", "runtime"),
     ("geometry",),
     (
-        "camera_image",
         "cloud",
         "frames",
         "gate",
