@@ -63,9 +63,7 @@ def from_pretrained(name_or_folder: str | os.PathLike[str], wanted: str | None =
         shape, no float of 16 bits or more, not finite, or a weight of zeros only: it is named.
     """
     folder = _find(name_or_folder)
-    cls, config = _read_config(folder)
-    if wanted is not None and cls.name != wanted:
-        raise ValueError(f"{folder} holds weights of the network {cls.name!r}, not of {wanted!r}")
+    cls, config = _read_config(folder, wanted)
     try:
         tensors = load_file(folder / WEIGHTS_FILE)
     except SafetensorError as error:
@@ -80,9 +78,14 @@ def read_config(name_or_folder: str | os.PathLike[str]) -> Any:
     return _read_config(_find(name_or_folder))[1]
 
 
-def _read_config(folder: Path) -> tuple[type[Pretrained], Any]:
+def _read_config(folder: Path, wanted: str | None = None) -> tuple[type[Pretrained], Any]:
     try:
         name, values = _split(read_json(folder / CONFIG_FILE))
+    except ValueError as error:
+        raise ValueError(f"{folder / CONFIG_FILE} is damaged: {error}") from error
+    if wanted is not None and name != wanted:
+        raise ValueError(f"{folder} holds weights of the network {name!r}, not of {wanted!r}")
+    try:
         cls = network_class(name)
         return cls, cls.config_type.from_dict(values)
     except (ValueError, TypeError, ArithmeticError) as error:

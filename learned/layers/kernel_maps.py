@@ -33,7 +33,7 @@ class Pairs:
     @cached_property
     def by_output(self) -> tuple[Tensor, Tensor]:
         """Pairs sorted by output (M,), and where each output's pairs begin (n_output,)."""
-        order = self.output.argsort(stable=True)
+        order = self.output.int().argsort(stable=True)  # half the bytes, half the time
         counts = torch.bincount(self.output, minlength=self.n_output)
         return order, counts.cumsum(0) - counts
 
@@ -59,6 +59,13 @@ class KernelMap:
     table: Tensor
     n_input: int
 
+    def narrower(self, size: int) -> KernelMap:
+        """The map of a kernel of the same centre and a smaller odd edge."""
+        edge = round(self.table.shape[1] ** (1 / 3))
+        some = slice((edge - size) // 2, (edge + size) // 2)
+        cells = self.table.view(-1, edge, edge, edge)[:, some, some, some]
+        return KernelMap(table=cells.reshape(len(self.table), size**3), n_input=self.n_input)
+
     @cached_property
     def n_pairs(self) -> int:
         """How many products there are."""
@@ -70,11 +77,12 @@ class KernelMap:
         n_output, volume = self.table.shape
         by_offset = self.table.t().reshape(-1)
         found = (by_offset < self.n_input).nonzero()[:, 0]
-        offset = found.div(n_output, rounding_mode="floor")
+        first = torch.arange(0, len(by_offset) + 1, max(1, n_output), device=found.device)[: volume + 1]
+        counts = torch.searchsorted(found, first).diff()
         return Pairs(
             input=by_offset[found].long(),
-            output=found - offset * n_output,
-            counts=tuple(torch.bincount(offset, minlength=volume).tolist()),
+            output=found - first[:volume].repeat_interleave(counts, output_size=len(found)),
+            counts=tuple(counts.tolist()),
             n_input=self.n_input,
             n_output=n_output,
         )
@@ -98,20 +106,30 @@ def kernel_map(inputs: Tensor, outputs: Tensor, size: int, stride: int) -> Kerne
 
     An output c meets the input at c + offset times the stride of the *input*.
     """
+    # Between the voxels of one level an odd kernel is its own mirror image: half of its rows are searched.
+    mirrored = inputs is outputs and size % 2 == 1
     scale = torch.tensor([1, stride, stride, stride], device=inputs.device)
     inputs, outputs = inputs.div(scale, rounding_mode="floor"), outputs.div(scale, rounding_mode="floor")
     keys, line = VoxelKeys.spanning(inputs, outputs, margin=size), _line(size).to(inputs.device)
-    have = keys.of(inputs)
+    have, volume = keys.of(inputs), size**3
     dz, dy = torch.meshgrid(line, line, indexing="ij")
+    steps = keys.step(dy, dz).flatten()[: size**2 // 2 + 1 if mirrored else None]
     # Neighbours along x have successive keys: one search finds the first of a row of the kernel, the others follow it.
-    rows = (keys.of(outputs)[:, None] + keys.step(dy, dz).flatten() + line[0]).flatten()
-    table = torch.full((len(rows) * size,), len(inputs), dtype=torch.int32, device=rows.device)
-    at, place = torch.arange(0, len(table), size, device=rows.device), torch.searchsorted(have, rows)
+    # Row by row, so that the keys that are searched rise: half of the time.
+    rows = (keys.of(outputs) + (steps + line[0])[:, None]).flatten()
+    table = torch.full((len(outputs) * volume,), len(inputs), dtype=torch.int32, device=rows.device)
+    first = torch.arange(0, len(table), volume, device=rows.device)
+    at = (first + size * torch.arange(len(steps), device=rows.device)[:, None]).flatten()
+    place = torch.searchsorted(have, rows)
     have = torch.cat([have, have.new_full((size,), 2**62)])
     for _ in range(size):
         apart = have.index_select(0, place).sub_(rows)
         found = (apart < size).nonzero()[:, 0]
         at, place, rows = (part.index_select(0, found) for part in (at, place, rows))
-        table[at + apart.index_select(0, found)] = place.int()
+        cell = at + apart.index_select(0, found)
+        table.scatter_(0, cell, place.int())
+        if mirrored:
+            output = cell.div(volume, rounding_mode="floor")
+            table.scatter_(0, (place + output) * volume + (volume - 1) - cell, output.int())
         place += 1
-    return KernelMap(table=table.view(len(outputs), size**3), n_input=len(inputs))
+    return KernelMap(table=table.view(len(outputs), volume), n_input=len(inputs))

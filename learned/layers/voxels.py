@@ -100,7 +100,17 @@ class VoxelPyramid:
         """
         key = (kernel, fine, coarse)
         if key not in self._maps:
-            self._maps[key] = kernel_map(self.levels[fine], self.levels[coarse], kernel, self.strides[fine])
+            wider = [
+                k
+                for k, *levels in self._maps
+                if levels == [fine, coarse] and k > kernel and k % 2 == kernel % 2 == 1
+            ]
+            if wider:
+                self._maps[key] = self._maps[min(wider), fine, coarse].narrower(kernel)
+            else:
+                self._maps[key] = kernel_map(
+                    self.levels[fine], self.levels[coarse], kernel, self.strides[fine]
+                )
         return self._maps[key]
 
 

@@ -9,7 +9,7 @@ import torch
 from torch.nn import functional as F
 
 from hybridreg.learned.layers import sparse_conv
-from hybridreg.learned.layers.kernel_maps import kernel_offsets
+from hybridreg.learned.layers.kernel_maps import kernel_map, kernel_offsets
 from hybridreg.learned.layers.sparse_conv import SparseConv, convolve
 from hybridreg.learned.layers.voxels import VoxelPyramid, quantise
 
@@ -145,3 +145,16 @@ def test_voxels_that_cannot_be_numbered_are_refused() -> None:
     far = torch.tensor([[0, 0, 0, 0], [0, 2**23, 2**23, 2**23]])
     with pytest.raises(ValueError, match="cannot be numbered: a stray point"):
         VoxelPyramid(far, (1, 2))
+
+
+@pytest.mark.parametrize("size", [3, 5])
+@pytest.mark.parametrize("stride", [1, 2])
+def test_half_a_search_and_a_wider_kernels_map_give_the_whole_map(size: int, stride: int) -> None:
+    drawn = torch.randint(0, 12, (900, 4), generator=torch.Generator().manual_seed(size)) * torch.tensor(
+        [1, *[stride] * 3]
+    )
+    coords = torch.unique(drawn % torch.tensor([2, 99, 99, 99]), dim=0)
+    levels = VoxelPyramid(coords, (1,)).levels[0]
+    whole = kernel_map(levels, levels.clone(), size, stride)  # two tensors: nothing is mirrored
+    assert torch.equal(kernel_map(levels, levels, size, stride).table, whole.table)
+    assert torch.equal(kernel_map(levels, levels, size + 2, stride).narrower(size).table, whole.table)
