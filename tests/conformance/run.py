@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Compare our network with a recording of the original: ``python tests/conformance/run.py STEM``.
 
-STEM names STEM.json, STEM.npz and STEM_weights.npz, in the folder of the recordings where it names no other. Exit 0 when every recorded output is within its tolerance.
+STEM names STEM.json, STEM.npz and STEM_weights.npz; a bare name, those in the folder of the recordings. Exit 0 when
+every recorded output is within its tolerance.
 """
 
 from __future__ import annotations
