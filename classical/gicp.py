@@ -97,7 +97,7 @@ class Gicp(Stage):
 
 
 def not_worse(scene: Scene, before: Pose, T: Array) -> Pose:
-    """The refined pose, unless far fewer source points lie on the target than before (methods of 2025-09, 9.5).
+    """The refined pose, unless far fewer source points lie on the target than before (docs/methods.md 9.6).
 
     small_gicp reports convergence also where it slid away or had no partner left, so the count decides. It may fall
     a little: a pose that is a degree off can bring more points of sparse rings near one another than the true one.

@@ -117,7 +117,7 @@ def test_a_name_leads_to_one_file_and_folders_and_files_stay_small() -> None:
         if not network and path.stem not in ("__init__", "__main__"):
             named[path.stem].append(path)
     assert not [paths for paths in named.values() if len(paths) > 1]
-    assert not [folder for folder, n in Counter(path.parent for path in product).items() if n > 20]
+    assert not [folder for folder, n in Counter(path.parent for path in files).items() if n > 20]
     lines = sorted(len(path.read_text().splitlines()) for path in product if path.stem != "__init__")
     assert lines[-1] <= 300
     assert lines[len(lines) // 2] <= 115

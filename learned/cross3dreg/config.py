@@ -19,7 +19,7 @@ _WIDEST, _MOST_KERNEL_POINTS, _MOST_BLOCKS, _MOST_NEIGHBORS = 8192, 256, 64, 10_
 
 @dataclass(frozen=True, kw_only=True)
 class BackboneConfig:
-    """KPConv-FPN. Lengths in metres; stage s has voxel ``voxel * 2**s`` (methods 2.3, 3.4)."""
+    """KPConv-FPN. Lengths in metres; stage s has voxel ``voxel * 2**s`` (docs/methods.md 2.3, 3.4)."""
 
     stages: int = 5
     voxel: float = 0.25
@@ -80,7 +80,7 @@ class BackboneConfig:
 
 @dataclass(frozen=True, kw_only=True)
 class ImageConfig:
-    """Residual U-Net on the photograph (methods 4)."""
+    """Residual U-Net on the photograph (docs/methods.md 4)."""
 
     height: int = 288
     width: int = 512
@@ -98,7 +98,7 @@ class ImageConfig:
 
 @dataclass(frozen=True, kw_only=True)
 class OmpConfig:
-    """Overlapping mask predictor (methods 5)."""
+    """Overlapping mask predictor (docs/methods.md 5)."""
 
     dim: int = 128
     heads: int = 4
@@ -121,7 +121,7 @@ class OmpConfig:
 
 @dataclass(frozen=True, kw_only=True)
 class VgamConfig:
-    """Visual-geometric attention before the GeoTransformer block (methods 6.1 to 6.5)."""
+    """Visual-geometric attention before the GeoTransformer block (docs/methods.md 6.1 to 6.5)."""
 
     repeats: int = 3
     heads: int = 4
@@ -141,7 +141,7 @@ class VgamConfig:
 
 @dataclass(frozen=True, kw_only=True)
 class TransformerConfig:
-    """GeoTransformer block (methods 6.6)."""
+    """GeoTransformer block (docs/methods.md 6.6)."""
 
     hidden_dim: int = 128
     output_dim: int = 256
@@ -166,7 +166,7 @@ class TransformerConfig:
 
 @dataclass(frozen=True, kw_only=True)
 class MatchingConfig:
-    """Superpoint and point matching (methods 7, 8).
+    """Superpoint and point matching (docs/methods.md 7, 8).
 
     The last three are ours, at inference only, and off by default, as published: fine points vote for pairs of
     superpoints, a match's weight is the geometric mean of its assignment and of how unique it is, and matches below
@@ -204,7 +204,7 @@ class MatchingConfig:
 
 @dataclass(frozen=True, kw_only=True)
 class LgrConfig:
-    """Local-to-global registration (methods 9.2)."""
+    """Local-to-global registration (docs/methods.md 9.2)."""
 
     acceptance_radius: float = 0.5  # metres
     min_group: int = 3
@@ -214,7 +214,7 @@ class LgrConfig:
 
 @dataclass(frozen=True, kw_only=True)
 class LossConfig:
-    """Targets and losses (methods 7.4, 10)."""
+    """Targets and losses (docs/methods.md 7.4, 10)."""
 
     targets: int = 128
     positive_overlap: float = 0.1

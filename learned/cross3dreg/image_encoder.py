@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The image encoder: a residual U-Net whose output the attention looks at, or one null token (methods 4)."""
+"""The image encoder: a residual U-Net whose output the attention looks at, or one null token (docs/methods.md 4)."""
 
 from __future__ import annotations
 

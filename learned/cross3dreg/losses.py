@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The three losses together (methods 10)."""
+"""The three losses together (docs/methods.md 10.3)."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The overlapping mask predictor: which superpoints does the other cloud share (methods 5.1)."""
+"""The overlapping mask predictor: which superpoints does the other cloud share (docs/methods.md 5.1)."""
 
 from __future__ import annotations
 

@@ -19,7 +19,7 @@ from hybridreg.learned.cross3dreg.config import (
 
 
 def _full() -> NetworkConfig:
-    # Appendix B of the specification: GeoTransformer's KITTI network at a voxel of 0.25 m.
+    # GeoTransformer's KITTI network at the voxel of Cross3DReg, 0.25 m (docs/methods.md 2 to 8).
     return NetworkConfig(backbone=BackboneConfig(norm_scope="per_cloud"))
 
 

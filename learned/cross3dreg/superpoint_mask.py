@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Which superpoints go on to the matching: the predicted mask, its fallbacks, and the cap (methods 5.5)."""
+"""Which superpoints go on to the matching: the predicted mask, its fallbacks, and the cap (docs/methods.md 5.5)."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What a network should have found, from the true pose: for training only (methods 5.2, 7.2)."""
+"""What a network should have found, from the true pose: for training only (docs/methods.md 5.2, 7.2)."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Which superpoints a training step keeps: jittered teacher forcing, later the prediction (methods 5.4)."""
+"""Which superpoints a training step keeps: jittered teacher forcing, later the prediction (docs/methods.md 5.4)."""
 
 from __future__ import annotations
 

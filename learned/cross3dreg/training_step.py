@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""One training step's forward pass: the only place where the truth meets a network (methods 5.4, 7.4)."""
+"""One training step's forward pass: the only place where the truth meets a network (docs/methods.md 5.4, 7.4)."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def training_losses(
 def fine_loss(
     network: RegistrationNetwork, encoding: Encoding, targets: Targets, generator: torch.Generator
 ) -> Tensor:
-    """Fine loss on random true patch pairs (methods 7.4)."""
+    """Fine loss on random true patch pairs (docs/methods.md 7.4)."""
     config = network.config.loss
     chosen = sample_target_pairs(targets, config.positive_overlap, config.targets, generator)
     target, source = targets.target[chosen], targets.source[chosen]

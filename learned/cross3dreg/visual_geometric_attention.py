@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Visual-geometric attention: superpoints look at the image, then at their own cloud (methods 6.1 to 6.5)."""
+"""Visual-geometric attention: superpoints look at the image, then at their own cloud (docs/methods.md 6.1 to 6.5)."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from hybridreg.learned.layers.positions import PointPosition, image_grid_encodin
 
 
 class VisualAttention(nn.Module):
-    """``softmax((Q + E)(K + G)^T / sqrt(c)) (V + G)``: positions enter score and value (methods 6.3).
+    """``softmax((Q + E)(K + G)^T / sqrt(c)) (V + G)``: positions enter score and value (docs/methods.md 6.3).
 
     c is the width of a head, or ``scale``; ``mix`` false leaves out the linear layer behind the heads.
     """

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The GeoTransformer block: geometric self-attention and cross-attention in turns (methods 6.6)."""
+"""The GeoTransformer block: geometric self-attention and cross-attention in turns (docs/methods.md 6.6)."""
 
 from __future__ import annotations
 

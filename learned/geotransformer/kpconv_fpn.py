@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""KPConv-FPN: an encoder over the stages of a pyramid and a decoder back to the fine stage (methods 3.4)."""
+"""KPConv-FPN: an encoder over the stages of a pyramid and a decoder back to the fine stage (docs/methods.md 3.4)."""
 
 from __future__ import annotations
 

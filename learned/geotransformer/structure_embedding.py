@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""GeoTransformer's geometric structure embedding: distances and angles between superpoints (methods 6.6)."""
+"""GeoTransformer's geometric structure embedding: distances and angles between superpoints (docs/methods.md 6.6)."""
 
 from __future__ import annotations
 

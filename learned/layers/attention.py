@@ -22,7 +22,7 @@ def merge_heads(features: Tensor) -> Tensor:
 
 
 class Attention(nn.Module):
-    """Multi-head attention; with ``geometric`` the score gains ``q_i . W_p r_ij`` (methods 6.6).
+    """Multi-head attention; with ``geometric`` the score gains ``q_i . W_p r_ij`` (docs/methods.md 6.6).
 
     Scores are divided by the root of a head's width, or of ``scale`` where that is given.
     """

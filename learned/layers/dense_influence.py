@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The geometry of a KPConv with a place for every neighbour: what a graphics card wants (methods 3.2).
+"""The geometry of a KPConv with a place for every neighbour: what a graphics card wants (docs/methods.md 3.2).
 
 The sparse form of `hybridreg.learned.layers.influence` does a tenth of the multiplications in some thirty times as many
 steps, each of which a card must be told of, and it has to ask the card how many neighbours each kernel point reaches.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Which neighbours reach which kernel points, and how strongly: the geometry of a KPConv (methods 3.2)."""
+"""Which neighbours reach which kernel points, and how strongly: the geometry of a KPConv (docs/methods.md 3.2)."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Where the kernel points of a KPConv lie: spread in the unit ball by repulsion (methods 3.1), or on half circles."""
+"""Kernel points of a KPConv: spread in the unit ball by repulsion, or on half circles (docs/methods.md 3.1)."""
 
 from __future__ import annotations
 

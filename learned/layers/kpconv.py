@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Rigid kernel point convolution (KPConv) with GeoTransformer's positive-sum normaliser (methods 3.2)."""
+"""Rigid kernel point convolution (KPConv) with GeoTransformer's positive-sum normaliser (docs/methods.md 3.2)."""
 
 from __future__ import annotations
 

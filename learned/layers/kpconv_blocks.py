@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The blocks of KPConv-FPN: normalisation, unary layers, convolution and residual blocks (methods 3.3)."""
+"""The blocks of KPConv-FPN: normalisation, unary layers, convolution and residual blocks (docs/methods.md 3.3)."""
 
 from __future__ import annotations
 

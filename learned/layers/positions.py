@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Positional encodings: sinusoids of a number, of an image grid, and learned ones of points (methods 6.2)."""
+"""Positional encodings: sinusoids of a number, of an image grid, and learned ones of points (docs/methods.md 6.2)."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Circle loss (Sun et al. 2020) on features: of superpoints, weighted by overlap (methods 10), and in general."""
+"""Circle loss (Sun et al. 2020) on features; the coarse loss weights it by patch overlap (docs/methods.md 10.1)."""
 
 from __future__ import annotations
 

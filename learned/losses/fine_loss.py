@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The fine loss: negative log-likelihood of the true assignment of patch pairs (methods 10)."""
+"""The fine loss: negative log-likelihood of the true assignment of patch pairs (docs/methods.md 10.2)."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Dense InfoNCE at the fine stage: each point with a partner must find it among all points (methods 10.1)."""
+"""Dense InfoNCE at the fine stage: each point with a partner must find it among all points (docs/methods.md 10.4)."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The mask loss: focal loss on the overlap logits (methods 5.3)."""
+"""The mask loss: focal loss on the overlap logits (docs/methods.md 5.3)."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Local-to-global registration: every patch pair proposes a pose, all correspondences vote (methods 9.2)."""
+"""Local-to-global registration: every patch pair proposes a pose, all correspondences vote (docs/methods.md 9.2)."""
 
 from __future__ import annotations
 

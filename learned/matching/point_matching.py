@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""From assignments of patch pairs to point correspondences (methods 8.5)."""
+"""From assignments of patch pairs to point correspondences (docs/methods.md 8.5)."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def _among_top(probability: Tensor, topk: int, dim: int) -> Tensor:
 def gather_matches(
     blocks: list[tuple[PatchPairs, Tensor]], target: Tensor, source: Tensor, config: MatchingConfig
 ) -> PointMatches:
-    """Correspondences of all assigned pairs (methods 8.5).
+    """Correspondences of all assigned pairs (docs/methods.md 8.5).
 
     Parameters
     ----------

@@ -2,7 +2,7 @@
 """All fine points of two clouds held against each other: votes for pairs of superpoints, and how unique a match is.
 
 Not in the published networks. There the superpoints' own features must find the partner, which takes far more training
-than the fine features do: those compare a point with thousands of others in every step (methods 10.1).
+than the fine features do: those compare a point with thousands of others in every step (docs/methods.md 10.4).
 """
 
 from __future__ import annotations

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Optimal transport with a slack row and column by Sinkhorn's iteration, in two forms (methods 8.3, 8.4)."""
+"""Optimal transport with a slack row and column by Sinkhorn's iteration, in two forms (docs/methods.md 8.3, 8.4)."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Superpoint matching by feature distance with dual normalisation (methods 7.3)."""
+"""Superpoint matching by feature distance with dual normalisation (docs/methods.md 7.3)."""
 
 from __future__ import annotations
 

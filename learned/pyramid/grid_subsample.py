@@ -8,7 +8,7 @@ from torch import Tensor
 
 
 def grid_subsample(points: Tensor, voxel: float) -> Tensor:
-    """Centroids of the occupied cells, ordered by cell (methods 2.2).
+    """Centroids of the occupied cells, ordered by cell (docs/methods.md 2.2).
 
     Parameters
     ----------

@@ -14,7 +14,7 @@ _COLUMN = 4.0  # metres: edge of the columns whose lowest point is taken for the
 
 
 def input_features(pyramid: Pyramid, kind: Literal["ones", "geometric"]) -> Tensor:
-    """(N_1, 1) ones, or (N_1, 4): one, height above ground in 10 m, ``|n_z|``, planarity (methods 10.1)."""
+    """(N_1, 1) ones, or (N_1, 4): one, height above ground in 10 m, ``|n_z|``, planarity (docs/methods.md 2.6)."""
     points = pyramid.points[0]
     ones = points.new_ones(len(points), 1)
     if kind == "ones":

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Patches: every fine point belongs to its nearest superpoint (methods 7.1)."""
+"""Patches: every fine point belongs to its nearest superpoint (docs/methods.md 7.1)."""
 
 from __future__ import annotations
 

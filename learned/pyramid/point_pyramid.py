@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The point pyramid of a pair: points, neighbours and links of every stage, target first (methods 2.4)."""
+"""The point pyramid of a pair: points, neighbours and links of every stage, target first (docs/methods.md 2.4)."""
 
 from __future__ import annotations
 
@@ -104,7 +104,7 @@ def build_pyramid(target: Tensor, source: Tensor, config: PyramidPlan, *, subsam
 def calibrate_neighbor_limits(
     pairs: list[tuple[Tensor, Tensor]], config: PyramidPlan, *, share: float = 0.8
 ) -> tuple[int, ...]:
-    """The neighbour count that ``share`` of the points do not exceed, one integer a stage (methods 2.3)."""
+    """The neighbour count that ``share`` of the points do not exceed, one integer a stage (docs/methods.md 2.3)."""
     counts: list[list[Tensor]] = [[] for _ in range(config.stages)]
     for pair in pairs:
         for cloud in pair:

@@ -16,7 +16,7 @@ from hybridreg.scene import Scene
 class DenseFeatures(NetworkStage):
     """Pair the fine points whose features are each other's nearest, as FCGF does (Choy et al. 2019).
 
-    No transformer takes part: a backbone that the contrastive warm-up has trained (specification 10.1) is enough,
+    No transformer takes part: a backbone that the contrastive warm-up has trained (docs/methods.md 10.4) is enough,
     and any estimator can go on from its matches. The weight of a match is the cosine of its features, at least 0.
 
     Parameters

@@ -82,7 +82,7 @@ class Phase:
     backbone_rate : factor on the rate of the backbone; 0 freezes it
     data : weights of sources by name, instead of their own; sources left out are not used
     accumulate : pairs of one optimiser step, over all processes together
-    use_predicted : how often a step sees the predicted overlap mask (methods 5.4)
+    use_predicted : how often a step sees the predicted overlap mask (docs/methods.md 5.4)
     """
 
     name: str

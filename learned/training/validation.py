@@ -111,7 +111,7 @@ def rank(found: Sequence[Validation], matcher: bool) -> tuple[float, ...]:
 
 
 def pair_inlier_ratio(superpoints: SuperpointMatches, targets: Targets) -> float:
-    """PIR: share of superpoint matches whose patches overlap under the true pose (methods 1.3)."""
+    """PIR: share of superpoint matches whose patches overlap under the true pose (docs/methods.md 1.3)."""
     if len(superpoints) == 0:
         return 0.0
     columns = len(targets.mask_source)

@@ -16,8 +16,8 @@ def build_patches(
 ) -> Array:
     """Patches (n, count, 3) of rows ``keypoints`` (n,) among points (N, 3).
 
-    More points than wanted: a random part of them; fewer: all of them over and over, and a random rest (methods of
-    ThreeDMatch/Test/preparation.py, where the draw has no seed). The last row is the keypoint itself.
+    Where a patch has more points than wanted, a random subset; where it has fewer, all of them repeated, and a random
+    remainder (as ThreeDMatch/Test/preparation.py does, without a seed). The last row is the keypoint itself.
     """
     tree = cKDTree(points)
     near = tree.query_ball_point(points[keypoints], r=radius)

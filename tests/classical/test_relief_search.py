@@ -5,12 +5,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from made_fields import field_pair
 
 import hybridreg as hr
 from hybridreg.geometry import se3
 from hybridreg.matches import Correspondences
 from hybridreg.testing import check_stage
-from tests.made_fields import field_pair
 
 
 def run(pair: hr.Pair, **fields: float) -> tuple[hr.Pose, hr.Scene]:

@@ -15,7 +15,12 @@ import sys
 from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
-sys.path[:0] = [str(HERE), str(HERE.parents[1])]
+# One folder a network; what several of them need lies beside this file.
+sys.path[:0] = [
+    str(HERE),
+    *(str(each) for each in sorted(HERE.iterdir()) if each.is_dir()),
+    str(HERE.parents[1]),
+]
 
 # A key that the plan of this network alone has. The module `recorded_NETWORK` offers `compare(stem)`: for every
 # recorded output its largest difference and the tolerance.

@@ -18,7 +18,8 @@ from hybridreg.learned.cross3dreg.network import RegistrationNetwork
 from hybridreg.learned.cross3dreg.sizes import named_config
 
 ROOT = Path(__file__).resolve().parents[2]
-sys.path.append(str(ROOT / "tests" / "conformance"))
+CONFORMANCE = ROOT / "tests" / "conformance"
+sys.path += [str(CONFORMANCE), *(str(each) for each in sorted(CONFORMANCE.iterdir()) if each.is_dir())]
 # The tensors are small: threads would only wait for each other.
 torch.set_num_threads(1)
 

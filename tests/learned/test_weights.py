@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Configurations and weights on disk (C12)."""
+"""Configurations and weights on disk."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Augmentation that leaves every index of a pyramid as it is: motions, noise, light (methods 2.5)."""
+"""Augmentation that leaves every index of a pyramid as it is: motions, noise, light (docs/methods.md 2.5)."""
 
 from __future__ import annotations
 

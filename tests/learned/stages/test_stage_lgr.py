@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Local-to-global registration as a stage (C8)."""
+"""Local-to-global registration as a stage."""
 
 from __future__ import annotations
 

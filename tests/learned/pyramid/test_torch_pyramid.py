@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Grids, neighbours and the pyramid (C2)."""
+"""Grids, neighbours and the pyramid."""
 
 from __future__ import annotations
 

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import torch
+from streets import moved, street, yaw
 from torch.nn import functional as F
 
 from hybridreg.learned.cross3dreg import superpoint_evidence as module
@@ -15,7 +16,6 @@ from hybridreg.learned.cross3dreg.batch import make_batch
 from hybridreg.learned.cross3dreg.network import Known, RegistrationNetwork
 from hybridreg.learned.cross3dreg.sizes import named_config
 from hybridreg.learned.cross3dreg.superpoint_evidence import SIZE, superpoint_evidence
-from tests.learned.streets import moved, street, yaw
 
 TEMPERATURE = 0.1
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from made_fields import field_pair
 
 import hybridreg as hr
 from hybridreg.evidence import views
 from hybridreg.geometry import se3
 from hybridreg.geometry.ground_relief import Alike, Relief, alike
-from tests.made_fields import field_pair
 
 
 def reliefs(**how: float) -> tuple[Relief, Relief, np.ndarray]:

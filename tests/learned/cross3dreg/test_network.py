@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The whole network: no truth near inference (C10), the mask's ladder (C9), image or none, sizes."""
+"""The whole network: no truth near inference, the mask's fallbacks, image or none, sizes."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Weighted Procrustes (C7) and local-to-global registration (C8)."""
+"""Weighted Procrustes and local-to-global registration."""
 
 from __future__ import annotations
 

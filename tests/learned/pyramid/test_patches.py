@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Patches, pairs and superpoint matching (C5, C6)."""
+"""Patches, pairs and superpoint matching."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""KPConv against a triple loop (C3), its blocks, and max-pooling."""
+"""KPConv against a triple loop, its blocks, and max-pooling."""
 
 from __future__ import annotations
 

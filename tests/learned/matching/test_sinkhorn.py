@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Optimal transport (C4): marginals, both forms, masks."""
+"""Optimal transport: marginals, both forms, masks."""
 
 from __future__ import annotations
 
