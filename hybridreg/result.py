@@ -31,8 +31,9 @@ class RegistrationResult:
     Attributes
     ----------
     transformation : (4, 4) float64
-        Maps source points to target points, `q = R p + t`, in the coordinates that the user gave. Its rotation
-        is orthogonal with determinant +1. `T_target_source` is another name for it.
+        Maps source points to target points, `q = R p + t` (`q = R (scale p) + t` where the scale was estimated), in the
+        coordinates that the user gave. Its rotation is orthogonal with determinant +1. `T_target_source` is another
+        name for it.
     verdict : "ok", "doubtful" or "failed"
     confidence : float in [0, 1]
         Estimated probability that the pose is right, to `tolerance`.
@@ -61,6 +62,11 @@ class RegistrationResult:
         The pipeline that made it, as `Pipeline.save` writes it.
     tolerance : Tolerance
         What "right" means to `confidence`: within so many degrees, and so many metres at the middle of the source.
+    scale : float
+        What to multiply the source's coordinates by before the transformation: other than 1 only where `scale=True`
+        asked for it.
+    scale_verdict : "ok", "doubtful", "failed" or None
+        Whether to believe the scale; None where it was not asked for.
     """
 
     transformation: Array
@@ -78,6 +84,8 @@ class RegistrationResult:
     seed: int
     spec: Mapping[str, Any] = field(repr=False)
     tolerance: Tolerance = VEHICLES
+    scale: float = 1.0
+    scale_verdict: Word | None = None
 
     @property
     def T_target_source(self) -> Array:

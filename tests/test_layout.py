@@ -38,6 +38,7 @@ ORDER = (
         "fitting",
         "pipeline",
         "presets",
+        "prior",
         "registry",
         "result",
         "spec",

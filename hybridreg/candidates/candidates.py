@@ -87,7 +87,8 @@ class Candidates(Stage):
     def __call__(self, scene: Scene, matches: Correspondences, rng: np.random.Generator) -> Pose:
         found: list[Rival] = []
         confidence = 0.0
-        for found in self._worth_trying(scene).stages(scene, matches, rng):
+        for every in self._worth_trying(scene).stages(scene, matches, rng):
+            found = [one for one in every if scene.pair.allows(one.T)]
             # To weigh a pose takes as long as to find some, and one that is rather wrong is not "ok".
             likely = bool(found) and found[0].support > _LIKELY
             confidence = weigh(scene, rivals.as_pose(found)).confidence if likely else 0.0
@@ -122,7 +123,8 @@ class Candidates(Stage):
                 missing.append(_left_out(entry, scene, error))
                 pose = Pose.unknown()
             if pose.found and np.isfinite(pose.T).all():
-                offered = rivals.best_first(scene, [pose.T, *pose.rivals[: _LOOKED_AT - 1]])
+                poses = [T for T in (pose.T, *pose.rivals) if scene.pair.allows(T)] or [pose.T]
+                offered = rivals.best_first(scene, poses[:_LOOKED_AT])
                 answers.append(offered)
                 found = _polished(scene, rivals.counted(scene, self._joined(scene, found, offered), answers))
             if len(missing) == len(self.of):

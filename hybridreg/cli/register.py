@@ -24,13 +24,6 @@ class NonFinite(str, Enum):
     drop = "drop"
 
 
-class Up(str, Enum):
-    """Whether both clouds stand on the same side of their ground."""
-
-    known = "known"
-    unknown = "unknown"
-
-
 @plainly
 def command(
     source: Annotated[Path, typer.Argument(help="The cloud that moves: ply, pcd, npy, npz, bin, las, txt.")],
@@ -45,13 +38,23 @@ def command(
     nonfinite: Annotated[NonFinite, typer.Option(help="Points that are not finite.")] = NonFinite.refuse,
     source_viewpoint: options.Viewpoint = "auto",
     target_viewpoint: options.Viewpoint = "auto",
-    gravity: Annotated[Up, typer.Option(help="'unknown' where one cloud may be upside down.")] = Up.known,
+    init: options.Init = None,
+    max_translation: options.MaxTranslation = None,
+    max_rotation: options.MaxRotation = None,
+    gravity: options.Gravity = "known",
+    crop: options.Crop = None,
+    crop_source: options.CropSource = None,
+    scale: options.Scale = False,
 ) -> None:
     """Align two point clouds; print the pose, whether to believe it, and the seconds of each stage."""
     from hybridreg.changes import build
     from hybridreg.pair import Pair
 
-    method = build(options.changes_of(preset, pipeline, settings, voxel))
+    changes = options.changes_of(preset, pipeline, settings, voxel)
+    known = options.prior(init, max_translation, max_rotation, gravity, crop, crop_source, scale)
+    if known:
+        changes["prior"] = {**changes.get("prior", {}), **known}
+    method = build(changes)
     pair = Pair.of(
         source,
         target,
@@ -59,7 +62,6 @@ def command(
         nonfinite="drop" if nonfinite is NonFinite.drop else "raise",
         source_viewpoint=options.viewpoint(source_viewpoint, "--source-viewpoint"),
         target_viewpoint=options.viewpoint(target_viewpoint, "--target-viewpoint"),
-        gravity="unknown" if gravity is Up.unknown else "known",
     )
     result = method.run(pair, seed=seed)
     show(result)
@@ -77,9 +79,11 @@ def show(result: RegistrationResult) -> None:
     print("T_target_source, metres:")
     for row in result.transformation:
         print("  " + " ".join(f"{value:14.9f}" for value in row))
+    if result.scale_verdict is not None:
+        print(f"scale: {result.scale:.5g} ({result.scale_verdict}); multiply the source by it first")
     print(f"verdict: {result.verdict} (confidence {result.confidence:.2f})")
     for reason in result.reasons:
-        print(f"  - {reason}")
+        print(f"  - {spoken(reason)}")
     for note in result.notes:
         print(f"note: {spoken(note)}")
     stages = ", ".join(f"{stage} {seconds:.3f}" for stage, seconds in result.seconds.items())
