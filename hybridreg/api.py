@@ -3,14 +3,51 @@
 
 from __future__ import annotations
 
+import os
 from typing import Any, Literal
 
+from hybridreg.cloud import PointCloud
 from hybridreg.geometry.viewpoint import Given
+from hybridreg.io.recorded.recording import Selection
 from hybridreg.pair import Pair
 from hybridreg.pipeline import Pipeline
 from hybridreg.presets import DEFAULT
 from hybridreg.prior.prior import Prior
 from hybridreg.result import RegistrationResult
+
+
+def read(
+    path: str | os.PathLike[str],
+    *,
+    topic: str | None = None,
+    index: int | None = None,
+    at: float | None = None,
+    accumulate: int = 1,
+    nonfinite: Literal["raise", "drop"] = "raise",
+    viewpoint: Given = "auto",
+) -> PointCloud:
+    """Read a cloud of any supported file, and choose one where it holds several.
+
+    Parameters
+    ----------
+    topic : str or None
+        Of a bag; None takes its only topic of clouds.
+    index : int or None
+        Counted from 0, negative from the end: the message of a bag, the frame of an LVX2 file, the scan of an E57 file
+        (of which all are read together if it is not given).
+    at : float or None
+        Seconds after a bag's first message.
+    accumulate : int
+        So many clouds that follow one another are laid together: for a sensor that stood still.
+    nonfinite, viewpoint : as for `PointCloud.of`
+
+    Raises
+    ------
+    FileNotFoundError, ValueError, ImportError
+        As `PointCloud.of`; a choice that the file does not offer, with those that it does.
+    """
+    select = Selection(topic=topic, index=index, at=at, accumulate=accumulate)
+    return PointCloud.of(path, name=os.fspath(path), nonfinite=nonfinite, viewpoint=viewpoint, select=select)
 
 
 def register(

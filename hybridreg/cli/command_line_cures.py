@@ -14,6 +14,7 @@ WORDS = (
     (r"a (smaller|larger) voxel or another unit", r"a \1 --voxel or another unit"),
     (r"\bseed=(\S+) must be", r"--seed \1 must be"),
     (r"\bvoxel=(\S+) must be", r"--voxel \1 must be"),
+    (r'choose one with topic="..."', "choose one with --topic"),
     (r"\bmax_translation=", "--max-translation "),
     (r"\bmax_rotation=", "--max-rotation "),
     (r"\bvoxel=(\S+) was given", r"--voxel \1 was given"),

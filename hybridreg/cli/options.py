@@ -22,6 +22,16 @@ Protocols = Annotated[
 Workers = Annotated[int, typer.Option(min=1, help="Processes, each with one thread.")]
 Overwrite = Annotated[bool, typer.Option("--overwrite", help="Run anew what the folder already holds.")]
 
+Topic = Annotated[str | None, typer.Option(help="Of a bag; `source's,target's` where they differ.")]
+Index = Annotated[
+    str | None,
+    typer.Option(metavar="N[,N]", help="Message of a bag, scan of an E57 file; for both, or one each."),
+]
+At = Annotated[
+    str | None, typer.Option(metavar="S[,S]", help="Seconds after a bag's start, instead of --index.")
+]
+Accumulate = Annotated[str | None, typer.Option(metavar="N[,N]", help="So many messages laid together.")]
+
 Viewpoint = Annotated[
     str,
     typer.Option(metavar="x,y,z|none|auto", help="Where its sensor stood, metres in the cloud's own frame."),
@@ -89,6 +99,34 @@ def _numbers(text: str, option: str, counts: tuple[int, ...], words: str) -> tup
     if len(numbers) not in counts:
         raise ValueError(f"{option} {text}: give {words}")
     return numbers
+
+
+def selections(
+    topic: str | None, index: str | None, at: str | None, accumulate: str | None
+) -> list[dict[str, Any]]:
+    """What `hybridreg.read` takes, for the source and for the target."""
+    told: list[dict[str, Any]] = [{}, {}]
+    for name, text, kind in (
+        ("topic", topic, str),
+        ("index", index, int),
+        ("at", at, float),
+        ("accumulate", accumulate, int),
+    ):
+        if text is None:
+            continue
+        parts = text.split(",")
+        try:
+            values = [kind(part) for part in parts]
+        except ValueError:
+            values = []
+        if len(values) not in (1, 2):
+            raise ValueError(
+                f"--{name} {text}: give one for both clouds, or the source's and the target's with a comma"
+            )
+        for side, value in zip(told, values * (2 // len(values)), strict=True):
+            if value != "":
+                side[name] = value
+    return told
 
 
 def viewpoint(text: str, option: str) -> Any:

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from enum import Enum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
@@ -26,7 +26,7 @@ class NonFinite(str, Enum):
 
 @plainly
 def command(
-    source: Annotated[Path, typer.Argument(help="The cloud that moves: ply, pcd, npy, npz, bin, las, txt.")],
+    source: Annotated[Path, typer.Argument(help="The cloud that moves: ply, pcd, npy, las, e57, a bag ...")],
     target: Annotated[Path, typer.Argument(help="The cloud that stays.")],
     image: Annotated[Path | None, typer.Option(help="A photograph of the common view.")] = None,
     preset: options.Preset = None,
@@ -36,6 +36,10 @@ def command(
     seed: options.Seed = 0,
     out: Annotated[Path | None, typer.Option(help="Folder for pose, result, page and picture.")] = None,
     nonfinite: Annotated[NonFinite, typer.Option(help="Points that are not finite.")] = NonFinite.refuse,
+    topic: options.Topic = None,
+    index: options.Index = None,
+    at: options.At = None,
+    accumulate: options.Accumulate = None,
     source_viewpoint: options.Viewpoint = "auto",
     target_viewpoint: options.Viewpoint = "auto",
     init: options.Init = None,
@@ -48,6 +52,9 @@ def command(
 ) -> None:
     """Align two point clouds; print the pose, whether to believe it, and the seconds of each stage."""
     from hybridreg.changes import build
+    from hybridreg.cloud import PointCloud
+    from hybridreg.io.point_files import holds_several
+    from hybridreg.io.recorded.recording import ANY, Selection
     from hybridreg.pair import Pair
 
     changes = options.changes_of(preset, pipeline, settings, voxel)
@@ -55,14 +62,21 @@ def command(
     if known:
         changes["prior"] = {**changes.get("prior", {}), **known}
     method = build(changes)
-    pair = Pair.of(
-        source,
-        target,
-        image,
-        nonfinite="drop" if nonfinite is NonFinite.drop else "raise",
-        source_viewpoint=options.viewpoint(source_viewpoint, "--source-viewpoint"),
-        target_viewpoint=options.viewpoint(target_viewpoint, "--target-viewpoint"),
-    )
+    select = options.selections(topic, index, at, accumulate)
+    missing: Literal["raise", "drop"] = "drop" if nonfinite is NonFinite.drop else "raise"
+    clouds = [
+        PointCloud.of(
+            path,
+            name=name,
+            nonfinite=missing,
+            viewpoint=options.viewpoint(place, f"--{name}-viewpoint"),
+            select=Selection(**choice) if holds_several(path) else ANY,
+        )
+        for name, path, place, choice in zip(
+            ("source", "target"), (source, target), (source_viewpoint, target_viewpoint), select, strict=True
+        )
+    ]
+    pair = Pair.of(*clouds, image)
     result = method.run(pair, seed=seed)
     show(result)
     if out is not None:
