@@ -23,6 +23,12 @@ def raise_pose(T: Array, pair: Pair) -> Array:
     return raised if pair.placed is None else pair.placed.raised(raised)
 
 
+def raise_target(points: Array, pair: Pair) -> Array:
+    """Places (n, 3) of the target's frame in the user's coordinates."""
+    raised = points + pair.target.offset
+    return raised if pair.placed is None else se3.apply(se3.inverse(pair.placed.target), raised)
+
+
 def raise_information(information: Array, pair: Pair) -> Array:
     """Information (6, 6) along the axes of the user's target, of one along those of the placed target."""
     if pair.placed is None:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from hybridreg import fitting, presets, spec
 from hybridreg.cloud import PointCloud
-from hybridreg.frames import lower_matches, raise_information, raise_matches, raise_pose
+from hybridreg.frames import lower_matches, raise_information, raise_matches, raise_pose, raise_target
 from hybridreg.geometry.se3 import project
 from hybridreg.io import shipped_weights
 from hybridreg.matches import Correspondences, Overlap, Pose
@@ -165,6 +165,7 @@ class Pipeline(Stage):
             reasons=judgement.reasons,
             overlay=judgement.overlay,
             information=raise_information(judgement.information, pair),
+            centre=raise_target(judgement.centre[None], pair)[0],
             evidence=judgement.evidence,
             notes=tuple(trace.scene.notes),
             seconds=trace.seconds,

@@ -36,6 +36,7 @@ ORDER = (
         "candidates",
         "changes",
         "fitting",
+        "output",
         "pipeline",
         "presets",
         "prior",

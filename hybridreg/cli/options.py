@@ -32,6 +32,12 @@ At = Annotated[
 ]
 Accumulate = Annotated[str | None, typer.Option(metavar="N[,N]", help="So many messages laid together.")]
 
+Format = Annotated[
+    str,
+    typer.Option(
+        "--format", help="The printed pose: matrix, quaternion, ros-tf, urdf, cloudcompare, kitti, tum."
+    ),
+]
 Viewpoint = Annotated[
     str,
     typer.Option(metavar="x,y,z|none|auto", help="Where its sensor stood, metres in the cloud's own frame."),

@@ -14,6 +14,7 @@ from hybridreg.cli.command_line_cures import spoken
 from hybridreg.cli.error_messages import VERDICT_FAILED, plainly
 
 if TYPE_CHECKING:
+    from hybridreg.cloud import PointCloud
     from hybridreg.result import RegistrationResult
 
 
@@ -35,6 +36,11 @@ def command(
     voxel: options.Voxel = None,
     seed: options.Seed = 0,
     out: Annotated[Path | None, typer.Option(help="Folder for pose, result, page and picture.")] = None,
+    aligned: Annotated[
+        Path | None, typer.Option(help="Write the source, moved onto the target: ply or pcd.")
+    ] = None,
+    merged: Annotated[Path | None, typer.Option(help="Write both clouds as one: ply or pcd.")] = None,
+    form: options.Format = "matrix",
     nonfinite: Annotated[NonFinite, typer.Option(help="Points that are not finite.")] = NonFinite.refuse,
     topic: options.Topic = None,
     index: options.Index = None,
@@ -55,8 +61,14 @@ def command(
     from hybridreg.cloud import PointCloud
     from hybridreg.io.point_files import holds_several
     from hybridreg.io.recorded.recording import ANY, Selection
+    from hybridreg.output.pose_text import FORMATS
     from hybridreg.pair import Pair
 
+    if form not in FORMATS:
+        raise ValueError(f"--format {form}: a pose is written as {', '.join(FORMATS)}")
+    for path in (aligned, merged):
+        if path is not None and path.suffix.lower() not in (".ply", ".pcd"):
+            raise ValueError(f"{path}: clouds are written as .ply or .pcd; choose such a name")
     changes = options.changes_of(preset, pipeline, settings, voxel)
     known = options.prior(init, max_translation, max_rotation, gravity, crop, crop_source, scale)
     if known:
@@ -78,7 +90,8 @@ def command(
     ]
     pair = Pair.of(*clouds, image)
     result = method.run(pair, seed=seed)
-    show(result)
+    show(result, form)
+    write_clouds(clouds, result, aligned, merged)
     if out is not None:
         from hybridreg.eval.report import single_report
 
@@ -88,11 +101,32 @@ def command(
         raise typer.Exit(VERDICT_FAILED)
 
 
-def show(result: RegistrationResult) -> None:
-    """Print a result."""
-    print("T_target_source, metres:")
-    for row in result.transformation:
-        print("  " + " ".join(f"{value:14.9f}" for value in row))
+def write_clouds(
+    clouds: list[PointCloud], result: RegistrationResult, aligned: Path | None, merged: Path | None
+) -> None:
+    """Write the aligned source, and both clouds as one, in the target's coordinates."""
+    import numpy as np
+
+    from hybridreg.io import write_points
+
+    source, target = clouds
+    if aligned is not None:
+        write_points(aligned, result.apply(source))
+        print(f"written: {aligned}")
+    if merged is not None:
+        write_points(merged, np.vstack([target.points + target.offset, result.apply(source)]))
+        print(f"written: {merged}")
+
+
+def show(result: RegistrationResult, form: str = "matrix") -> None:
+    """Print a result, its pose in one of `hybridreg.output.pose_text.FORMATS`."""
+    if form == "matrix":
+        print("T_target_source, metres:")
+        for row in result.transformation:
+            print("  " + " ".join(f"{value:14.9f}" for value in row))
+    else:
+        print(f"T_target_source, metres, as {form}:")
+        print(result.format(form))
     if result.scale_verdict is not None:
         print(f"scale: {result.scale:.5g} ({result.scale_verdict}); multiply the source by it first")
     print(f"verdict: {result.verdict} (confidence {result.confidence:.2f})")

@@ -66,6 +66,7 @@ class Judgement:
     overlay : Overlay
         The whole clouds under the pose, within twice the scene's spacing of one another.
     information : (6, 6) float64
+    centre : (3,) float64
         See `hybridreg.evidence.information.Information`.
     rivals : (r, 4, 4) float64
         Poses that explain the data nearly as well, best first.
@@ -77,6 +78,7 @@ class Judgement:
     evidence: dict[str, float]
     overlay: Overlay
     information: Array
+    centre: Array
     rivals: Array
 
 
@@ -104,6 +106,7 @@ def judge(scene: Scene, pose: Pose, matches: Correspondences) -> Judgement:
         evidence=evidence,
         overlay=Overlay(scene.pair.source.points, scene.pair.target.points, pose.T, 2.0 * scene.spacing),
         information=weighed.held.matrix,
+        centre=weighed.held.centre,
         rivals=_close(weighed.rivals, weighed.evidence["support"]),
     )
 
