@@ -17,7 +17,7 @@ if (_root / "pyproject.toml").is_file() and (_root / "classical").is_dir():
     __path__.append(str(_root))
 
 if TYPE_CHECKING:
-    from hybridreg.api import register
+    from hybridreg.api import read, register
     from hybridreg.candidates.candidates import Candidates
     from hybridreg.classical.fgr import Fgr
     from hybridreg.classical.fpfh import Fpfh
@@ -54,7 +54,7 @@ if TYPE_CHECKING:
     from hybridreg.stage import Stage
 
 _WHERE = {
-    "hybridreg.api": ["register"],
+    "hybridreg.api": ["read", "register"],
     "hybridreg.classical.overhead.birdseye": ["BirdsEye"],
     "hybridreg.candidates.candidates": ["Candidates"],
     "hybridreg.classical.fgr": ["Fgr"],

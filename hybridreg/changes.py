@@ -13,7 +13,7 @@ from hybridreg.pipeline import Pipeline
 from hybridreg.slots import SLOTS
 from hybridreg.spec import to_table
 
-KEYS = ("preset", "pipeline", "voxel", *SLOTS)
+KEYS = ("preset", "pipeline", "voxel", "prior", *SLOTS)
 
 
 def build(changes: Mapping[str, Any]) -> Pipeline:
@@ -23,7 +23,8 @@ def build(changes: Mapping[str, Any]) -> Pipeline:
     ----------
     changes : mapping
         `preset` a name or `pipeline` a TOML file, `voxel` metres, and for each slot a stage's name, a table
-        with `stage` for another stage, or a table without it for other fields of the stage that is there.
+        with `stage` for another stage, or a table without it for other fields of the stage that is there; `prior` a
+        table of what is known beforehand (`hybridreg.prior.prior.Prior`).
 
     Raises
     ------
@@ -46,7 +47,7 @@ def build(changes: Mapping[str, Any]) -> Pipeline:
     else:
         name = changes.get("preset", presets.DEFAULT)
         start, what = Pipeline(**presets.load(name)), f"preset {name!r}"
-    built = apply(start, {key: value for key, value in changes.items() if key in SLOTS or key == "voxel"})
+    built = apply(start, {key: value for key, value in changes.items() if key not in ("preset", "pipeline")})
     # Now, not before: the weights may be what was changed.
     shipped_weights.require({slot: getattr(built, slot) for slot in SLOTS}, what)
     return built
@@ -56,7 +57,9 @@ def apply(pipeline: Pipeline, changes: Mapping[str, Any]) -> Pipeline:
     """The pipeline with some slots filled anew, or some fields of a slot's stage changed."""
     slots: dict[str, Any] = {}
     for slot, change in changes.items():
-        if isinstance(change, Mapping) and "stage" not in change:
+        if slot == "prior":
+            slots[slot] = change if pipeline.prior is None else {**pipeline.prior.to_table(), **change}
+        elif isinstance(change, Mapping) and "stage" not in change:
             slots[slot] = {**to_table(getattr(pipeline, slot), slot), **change}
         else:
             slots[slot] = change

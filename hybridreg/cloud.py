@@ -15,7 +15,8 @@ from hybridreg import gate
 from hybridreg.geometry import extent
 from hybridreg.geometry.range_image import RangeImage, RangeImages
 from hybridreg.geometry.viewpoint import Given, Seen, found, given
-from hybridreg.io import read_viewpoint
+from hybridreg.io import read_recorded, read_viewpoint
+from hybridreg.io.recorded.recording import ANY, Recorded, Selection
 
 Array = NDArray[np.float64]
 
@@ -59,6 +60,7 @@ class PointCloud:
         sensor: str = "",
         nonfinite: Literal["raise", "drop"] = "raise",
         viewpoint: Given = "auto",
+        select: Selection = ANY,
     ) -> PointCloud:
         """Check and convert anything that holds points: the one gate of the library.
 
@@ -79,6 +81,8 @@ class PointCloud:
             row of each point's. "none" is honest for a map, a CAD model or a merged cloud whose sensors are not known:
             free space is not tested then. "auto" takes what the file says, or tests whether a sensor may have stood
             at the origin (`hybridreg.geometry.viewpoint`).
+        select : Selection
+            Which cloud of a file that holds several: of a bag, an E57 file.
 
         Raises
         ------
@@ -89,12 +93,18 @@ class PointCloud:
             gate.check(x.points, name)
             said = given(viewpoint, len(x), name)
             return x if said is None else replace(x, said=said.less(x.offset))
-        raw = gate.coordinates(x, name)
-        place = read_viewpoint(x) if isinstance(x, (str, os.PathLike)) else None
-        kept, rows = gate.finite(raw, name, drop=nonfinite == "drop")
-        kept, rows = gate.returned(kept, rows, name, drop=nonfinite == "drop")
+        recorded, place = Recorded(np.empty((0, 3))), None
+        if isinstance(x, (str, os.PathLike)):
+            recorded, place = read_recorded(x, select), read_viewpoint(x)
+        raw = recorded.points if isinstance(x, (str, os.PathLike)) else gate.coordinates(x, name)
+        drop = nonfinite == "drop" or recorded.holed
+        kept, rows = gate.finite(raw, name, drop=drop)
+        kept, rows = gate.returned(kept, rows, name, drop=drop)
         gate.rounded(kept, name)
         said = given(viewpoint, len(raw), name)
+        if recorded.places is not None and isinstance(viewpoint, str) and viewpoint == "auto":
+            words = "as its file says" if len(recorded.places) else "a surface, which no sensor saw"
+            said = Seen(recorded.places, recorded.of_point, words)
         offset = _whole_kilometres(kept)
         points = kept - offset if offset.any() else kept  # a copy of the caller's already
         gate.check(points, name)

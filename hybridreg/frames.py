@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from hybridreg.geometry import se3
 from hybridreg.matches import Correspondences
 from hybridreg.pair import Pair
 
@@ -19,11 +20,27 @@ def raise_pose(T: Array, pair: Pair) -> Array:
     """Pose between the user's coordinates, of a pose between the clouds with their offsets taken off."""
     raised = T.copy()
     raised[:3, 3] = T[:3, 3] + pair.target.offset - T[:3, :3] @ pair.source.offset
-    return raised
+    return raised if pair.placed is None else pair.placed.raised(raised)
+
+
+def raise_target(points: Array, pair: Pair) -> Array:
+    """Places (n, 3) of the target's frame in the user's coordinates."""
+    raised = points + pair.target.offset
+    return raised if pair.placed is None else se3.apply(se3.inverse(pair.placed.target), raised)
+
+
+def raise_information(information: Array, pair: Pair) -> Array:
+    """Information (6, 6) along the axes of the user's target, of one along those of the placed target."""
+    if pair.placed is None:
+        return information
+    turn = np.kron(np.eye(2), pair.placed.target[:3, :3].T)
+    turned: Array = turn @ information @ turn.T
+    return turned
 
 
 def lower_pose(T: Array, pair: Pair) -> Array:
     """The reverse of `raise_pose`."""
+    T = T if pair.placed is None else pair.placed.lowered(T)
     lowered = T.copy()
     lowered[:3, 3] = T[:3, 3] - pair.target.offset + T[:3, :3] @ pair.source.offset
     return lowered
@@ -31,9 +48,11 @@ def lower_pose(T: Array, pair: Pair) -> Array:
 
 def raise_matches(matches: Correspondences, pair: Pair) -> Correspondences:
     """Matches in the user's coordinates."""
-    return dataclasses.replace(
-        matches, source=matches.source + pair.source.offset, target=matches.target + pair.target.offset
-    )
+    source, target = matches.source + pair.source.offset, matches.target + pair.target.offset
+    if pair.placed is not None:
+        source = se3.apply(se3.inverse(pair.placed.source), source) / pair.placed.scale
+        target = se3.apply(se3.inverse(pair.placed.target), target)
+    return dataclasses.replace(matches, source=source, target=target)
 
 
 def lower_matches(matches: Any, pair: Pair) -> Correspondences:
@@ -50,8 +69,12 @@ def lower_matches(matches: Any, pair: Pair) -> Correspondences:
         Wrong shape or type, or a row that a cloud does not have.
     """
     if isinstance(matches, Correspondences):
+        source, target = matches.source, matches.target
+        if pair.placed is not None:
+            source = se3.apply(pair.placed.source, source * pair.placed.scale)
+            target = se3.apply(pair.placed.target, target)
         return dataclasses.replace(
-            matches, source=matches.source - pair.source.offset, target=matches.target - pair.target.offset
+            matches, source=source - pair.source.offset, target=target - pair.target.offset
         )
     rows = np.asarray(matches)
     if rows.ndim != 2 or rows.shape[1] != 2 or rows.dtype.kind not in "iu":

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import os
 import warnings
 from collections.abc import Iterator
 from typing import Any
@@ -27,11 +26,7 @@ _LOOKED_AT = 2_000  # points whose rounding is looked at
 
 
 def coordinates(x: Any, name: str) -> Array:
-    """Take (N, 3) float64 coordinates out of anything that holds points."""
-    if isinstance(x, (str, os.PathLike)):
-        from hybridreg.io import read_points
-
-        return read_points(x)
+    """Take (N, 3) float64 coordinates out of any object that holds points."""
     try:
         return points_of(x, name)
     except (ValueError, MemoryError) as error:

@@ -14,6 +14,8 @@ from numpy.typing import NDArray
 
 from hybridreg.cloud import PointCloud
 from hybridreg.geometry import se3
+from hybridreg.geometry.placement import Placement
+from hybridreg.geometry.pose_bounds import PoseBounds
 from hybridreg.geometry.viewpoint import Given
 from hybridreg.io.camera_image import Photograph
 
@@ -39,6 +41,10 @@ class Pair:
     gravity : "known" or "unknown"
         "known": both clouds have the same side of the ground up, so that a pose that turns the world upside down is
         wrong. "unknown": they may not (an object that was turned over between two scans).
+    placed : Placement or None
+        Where the clouds were put before the search (`hybridreg.prior`); results are told in the user's coordinates.
+    bounds : PoseBounds or None
+        Which poses are possible at all.
     """
 
     source: PointCloud
@@ -47,6 +53,12 @@ class Pair:
     id: str = "pair"
     meta: Mapping[str, Any] = field(default_factory=dict)
     gravity: Gravity = "known"
+    placed: Placement | None = None
+    bounds: PoseBounds | None = None
+
+    def allows(self, T: Array) -> bool:
+        """Whether a pose (4, 4) between the clouds' frames lies within the bounds, where there are some."""
+        return self.bounds is None or self.bounds.allow(T)
 
     def with_clouds(self, source: PointCloud, target: PointCloud) -> Pair:
         """The same pair of other clouds."""

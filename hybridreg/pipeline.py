@@ -14,11 +14,12 @@ from numpy.typing import NDArray
 
 from hybridreg import fitting, presets, spec
 from hybridreg.cloud import PointCloud
-from hybridreg.frames import lower_matches, raise_matches, raise_pose
+from hybridreg.frames import lower_matches, raise_information, raise_matches, raise_pose, raise_target
 from hybridreg.geometry.se3 import project
 from hybridreg.io import shipped_weights
 from hybridreg.matches import Correspondences, Overlap, Pose
 from hybridreg.pair import Pair
+from hybridreg.prior.prior import Prior
 from hybridreg.resolution import tolerance
 from hybridreg.result import RegistrationResult
 from hybridreg.returned import checked
@@ -49,6 +50,8 @@ class Pipeline(Stage):
     ----------
     voxel : float or None
         Shorthand for `downsample=VoxelGrid(voxel=...)`, metres: one number is a whole configuration.
+    prior : Prior, mapping of its fields, or None
+        What is known of the pose beforehand: `hybridreg.prior.prior.Prior`.
 
     Raises
     ------
@@ -64,6 +67,7 @@ class Pipeline(Stage):
     match: Any = "fpfh"
     estimate: Any = "ransac"
     refine: Any = "gicp"
+    prior: Any = None
 
     def __post_init__(self) -> None:
         for slot in SLOTS:
@@ -72,6 +76,8 @@ class Pipeline(Stage):
                 object.__setattr__(self, slot, spec.from_table(given, slot))
         object.__setattr__(self, "downsample", fitting.with_voxel(self.downsample, self.voxel))
         fitting.check(self)
+        if self.prior is not None:
+            object.__setattr__(self, "prior", Prior.of(self.prior))
 
     @classmethod
     def preset(cls, name: str, *, voxel: float | None = None) -> Pipeline:
@@ -98,12 +104,13 @@ class Pipeline(Stage):
         presets.write(path, self.to_spec())
 
     def to_spec(self) -> dict[str, Any]:
-        """One table a slot."""
-        return {slot: spec.to_table(getattr(self, slot), slot) for slot in SLOTS}
+        """One table a slot, and one of the prior where there is one."""
+        slots = {slot: spec.to_table(getattr(self, slot), slot) for slot in SLOTS}
+        return slots if self.prior is None else {**slots, "prior": self.prior.to_table()}
 
     def swap(self, **stages: Any) -> Pipeline:
         """A copy with some slots filled anew: `pipe.swap(estimate="ransac")`."""
-        unknown = set(stages) - {*SLOTS, "voxel"}
+        unknown = set(stages) - {*SLOTS, "voxel", "prior"}
         if unknown:
             raise TypeError(
                 f"no slot is called {', '.join(sorted(unknown))}; the slots are {', '.join(SLOTS)}"
@@ -143,10 +150,14 @@ class Pipeline(Stage):
         """The verdict on a traced run, and its result in the coordinates that the user gave."""
         pair = trace.scene.pair
         with trace.scene.clock.phase("verdict"):
-            from hybridreg.verdict import judge
+            from hybridreg.verdict import judge, of_scale
 
             judgement = judge(trace.scene, trace.refined, trace.matches)
         return RegistrationResult(
+            scale=1.0 if pair.placed is None else pair.placed.scale,
+            scale_verdict=of_scale(judgement, pair.placed.margin)
+            if pair.placed and self.prior.scale
+            else None,
             transformation=raise_pose(trace.refined.T, pair),
             rivals=np.array([raise_pose(T, pair) for T in judgement.rivals]).reshape(-1, 4, 4),
             matches=raise_matches(trace.matches, pair),
@@ -154,7 +165,8 @@ class Pipeline(Stage):
             confidence=judgement.confidence,
             reasons=judgement.reasons,
             overlay=judgement.overlay,
-            information=judgement.information,
+            information=raise_information(judgement.information, pair),
+            centre=raise_target(judgement.centre[None], pair)[0],
             evidence=judgement.evidence,
             notes=tuple(trace.scene.notes),
             seconds=trace.seconds,
@@ -169,10 +181,17 @@ class Pipeline(Stage):
         """Run the stages and keep what each of them made."""
         from hybridreg.evidence.match_agreement import of_most
 
+        clock = Clock()
+        if self.prior is not None:
+            if matches is not None and self.prior.crop and not isinstance(matches, Correspondences):
+                raise ValueError(
+                    "matches: rows of points do not go with crop=...; give Correspondences instead"
+                )
+            with clock.phase("prior"):
+                pair = self.prior.applied(pair)
         fitting.check_image(self, pair)
         fitting.check_seed(seed)
         rng = np.random.default_rng([seed, zlib.crc32(pair.id.encode())])
-        clock = Clock()
         with clock.phase("downsample"):
             scene = replace(checked("downsample", self.downsample, self.downsample(pair)), clock=clock)
         fitting.check_scene(scene)
@@ -190,12 +209,15 @@ class Pipeline(Stage):
                 found = scene.matched(checked("match", self.match, self.match(scene, overlap)))
             else:
                 found = scene.matched(lower_matches(matches, pair))
+        estimate = self.estimate if self.prior is None else self.prior.started(self.estimate)
         with clock.phase("estimate"):
-            estimated = _proper(checked("estimate", self.estimate, self.estimate(scene, found, rng), scene))
+            estimated = _proper(checked("estimate", self.estimate, estimate(scene, found, rng), scene))
+            estimated = _within(scene, estimated)
         with clock.phase("refine"):
             refined = estimated
             if estimated.found:
                 refined = _proper(checked("refine", self.refine, self.refine(scene, estimated), scene))
+                refined = _within(scene, refined)
         if not len(found):  # an estimator that runs recipes of its own may have matched
             found = of_most(scene, refined.T)
         return Trace(scene, overlap, found, estimated, refined, clock.seconds)
@@ -206,6 +228,20 @@ def _places(cloud: PointCloud) -> str:
     if several:
         return f"{several} places, {cloud.seen.words}"
     return f"no known place ({cloud.seen.words}); if you know it, say so: a viewpoint lets free space speak"
+
+
+def _within(scene: Scene, pose: Pose) -> Pose:
+    """The pose, or the best of its rivals that the pair's bounds allow; where none is, no pose."""
+    bounds = scene.pair.bounds
+    if bounds is None or not pose.found:
+        return pose
+    allowed = [T for T in (pose.T, *pose.rivals) if bounds.allow(T)]
+    if not allowed:
+        scene.explanations.append(f"the best pose lies {bounds.against(pose.T)}")
+        return Pose.unknown(0 if pose.inliers is None else len(pose.inliers))
+    if bounds.allow(pose.T):
+        return replace(pose, rivals=np.array(allowed[1:]).reshape(-1, 4, 4))
+    return Pose.ranked(allowed)
 
 
 def _proper(pose: Pose) -> Pose:

@@ -7,13 +7,19 @@ import json
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
+from functools import cached_property
 from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from hybridreg.cloud import PointCloud
+from hybridreg.geometry import se3
 from hybridreg.geometry.fitness import Overlay
 from hybridreg.matches import Correspondences, EntryTrace
+from hybridreg.output import picture, result_words
+from hybridreg.output.covariance import of_information
+from hybridreg.output.pose_text import pose_text
 from hybridreg.resolution import VEHICLES, Tolerance
 
 Array = NDArray[np.float64]
@@ -31,8 +37,9 @@ class RegistrationResult:
     Attributes
     ----------
     transformation : (4, 4) float64
-        Maps source points to target points, `q = R p + t`, in the coordinates that the user gave. Its rotation
-        is orthogonal with determinant +1. `T_target_source` is another name for it.
+        Maps source points to target points, `q = R p + t` (`q = R (scale p) + t` where the scale was estimated), in the
+        coordinates that the user gave. Its rotation is orthogonal with determinant +1. `T_target_source` is another
+        name for it.
     verdict : "ok", "doubtful" or "failed"
     confidence : float in [0, 1]
         Estimated probability that the pose is right, to `tolerance`.
@@ -65,6 +72,13 @@ class RegistrationResult:
         pipeline has one estimator.
     tolerance : Tolerance
         What "right" means to `confidence`: within so many degrees, and so many metres at the middle of the source.
+    centre : (3,) float64
+        Centre of the overlap in the target's coordinates, about which `information` and `covariance` count turns.
+    scale : float
+        What to multiply the source's coordinates by before the transformation: other than 1 only where `scale=True`
+        asked for it.
+    scale_verdict : "ok", "doubtful", "failed" or None
+        Whether to believe the scale; None where it was not asked for.
     """
 
     transformation: Array
@@ -83,6 +97,9 @@ class RegistrationResult:
     spec: Mapping[str, Any] = field(repr=False)
     tolerance: Tolerance = VEHICLES
     entries: tuple[EntryTrace, ...] = ()
+    centre: Array = field(default_factory=lambda: np.zeros(3), repr=False)
+    scale: float = 1.0
+    scale_verdict: Word | None = None
 
     @property
     def T_target_source(self) -> Array:
@@ -113,6 +130,40 @@ class RegistrationResult:
     def max_distance(self) -> float:
         """Farthest that two points of `correspondence_set` lie apart, metres."""
         return self.overlay.max_distance
+
+    @cached_property
+    def covariance(self) -> Array:
+        """Covariance (6, 6) of a right pose's error: turns about `centre` (radians) before translations (metres), along
+        the target's axes; infinite where the surfaces leave a direction open. See `hybridreg.output.covariance` for
+        what its scale was checked against. It says nothing of a wrong pose: that is `confidence`."""
+        return of_information(self.information)
+
+    def apply(self, points: Any) -> Array:
+        """Points of the source (N, 3), or any cloud that `PointCloud.of` takes, in the target's coordinates: (N, 3)."""
+        cloud = points if isinstance(points, np.ndarray) else PointCloud.of(points, name="points")
+        if isinstance(cloud, PointCloud):
+            rows = cloud.points + cloud.offset
+        else:
+            rows = np.asarray(cloud, dtype=np.float64)
+            if rows.ndim != 2 or rows.shape[1] < 3:
+                raise ValueError(f"points: expected an array of shape (N, 3), got {rows.shape}")
+        return se3.apply(self.transformation, rows[:, :3] * self.scale)
+
+    def format(self, form: str) -> str:
+        """The pose as "matrix", "quaternion", "ros-tf", "urdf", "cloudcompare", "kitti" or "tum"; see
+        `hybridreg.output.pose_text.FORMATS`."""
+        return pose_text(self.transformation, form)
+
+    def summary(self) -> str:
+        """A few lines to print: verdict, pose, spread, reasons, notes."""
+        return result_words.summary(self)
+
+    def plot(self) -> Any:
+        """A plotly figure of both clouds (extra `report`): `result.plot().show()`, or `.write_html("a.html")`."""
+        return picture.figure(self.overlay)
+
+    def _repr_html_(self) -> str:
+        return result_words.html(self)
 
     def to_dict(self) -> dict[str, Any]:
         """Plain numbers, lists and strings; the per-point arrays become their counts."""

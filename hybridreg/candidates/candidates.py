@@ -99,7 +99,8 @@ class Candidates(Stage):
         found: list[Hypothesis] = []
         traces: list[EntryTrace] = []
         pose, confidence = Pose.unknown(len(matches)), 0.0
-        for found in self._worth_trying(scene).stages(scene, matches, rng, traces):
+        for every in self._worth_trying(scene).stages(scene, matches, rng, traces):
+            found = [one for one in every if scene.pair.allows(one.T)]
             if not found:
                 continue
             pose, confidence = as_pose(found), 0.0
@@ -153,8 +154,7 @@ class Candidates(Stage):
                 missing.append(problem)
                 pose = Pose.unknown()
             if pose.found and np.isfinite(pose.T).all():
-                starts = pose.hypotheses or [pose.T, *pose.rivals]
-                here = [one.but(came_from=name) for one in best_first(scene, starts[:_LOOKED_AT])]
+                here = [one.but(came_from=name) for one in best_first(scene, _starts(scene, pose))]
                 offered.append(here)
                 found = _polished(scene, counted(scene, self._joined(scene, found, here), offered))
             if len(missing) == len(self.of):
@@ -193,6 +193,14 @@ class Candidates(Stage):
 
 # What the second look at all that was tried is called among the entries.
 _AGAIN = "second look"
+
+
+def _starts(scene: Scene, pose: Pose) -> list[Hypothesis | Array]:
+    # What an entry offers, within the pair's bounds; its best beyond them, where nothing else is left.
+    offered = list(pose.hypotheses or [pose.T, *pose.rivals])
+    poses = [pose.T, *pose.rivals]
+    allowed = [one for one, T in zip(offered, poses, strict=True) if scene.pair.allows(T)]
+    return (allowed or offered[:1])[:_LOOKED_AT]
 
 
 def _polished(scene: Scene, found: list[Hypothesis]) -> list[Hypothesis]:

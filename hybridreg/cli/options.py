@@ -22,10 +22,117 @@ Protocols = Annotated[
 Workers = Annotated[int, typer.Option(min=1, help="Processes, each with one thread.")]
 Overwrite = Annotated[bool, typer.Option("--overwrite", help="Run anew what the folder already holds.")]
 
+Topic = Annotated[str | None, typer.Option(help="Of a bag; `source's,target's` where they differ.")]
+Index = Annotated[
+    str | None,
+    typer.Option(metavar="N[,N]", help="Message of a bag, scan of an E57 file; for both, or one each."),
+]
+At = Annotated[
+    str | None, typer.Option(metavar="S[,S]", help="Seconds after a bag's start, instead of --index.")
+]
+Accumulate = Annotated[str | None, typer.Option(metavar="N[,N]", help="So many messages laid together.")]
+
+Format = Annotated[
+    str,
+    typer.Option(
+        "--format", help="The printed pose: matrix, quaternion, ros-tf, urdf, cloudcompare, kitti, tum."
+    ),
+]
 Viewpoint = Annotated[
     str,
     typer.Option(metavar="x,y,z|none|auto", help="Where its sensor stood, metres in the cloud's own frame."),
 ]
+
+Init = Annotated[Path | None, typer.Option(help="A rough pose: a file of a 4x4 matrix, or a result.json.")]
+MaxTranslation = Annotated[float | None, typer.Option(help="Farthest from there, metres.")]
+MaxRotation = Annotated[float | None, typer.Option(help="Farthest turned from there, degrees.")]
+Gravity = Annotated[
+    str,
+    typer.Option(
+        metavar="known|unknown|up|x,y,z",
+        help="'unknown': one cloud may be upside down; 'up': z points up in both; or the axis that does.",
+    ),
+]
+Crop = Annotated[
+    str | None,
+    typer.Option(
+        metavar="R|x,y,z,x,y,z",
+        help="Of the target, what lies R metres from the start, or in a box (low, high).",
+    ),
+]
+CropSource = Annotated[
+    str | None, typer.Option(metavar="x,y,z,x,y,z", help="Of the source, what lies in a box.")
+]
+Scale = Annotated[bool, typer.Option("--scale", help="The source's size is not known: estimate it.")]
+
+
+def prior(
+    init: Path | None,
+    max_translation: float | None,
+    max_rotation: float | None,
+    gravity: str,
+    crop: str | None,
+    crop_source: str | None,
+    scale: bool,
+) -> dict[str, Any]:
+    """What of `hybridreg.prior.prior.Prior` the command line tells."""
+    region: dict[str, Any] = {}
+    if crop is not None:
+        numbers = _numbers(crop, "--crop", (1, 6), "a radius in metres, or the six numbers of a box")
+        region["radius" if len(numbers) == 1 else "target"] = numbers[0] if len(numbers) == 1 else numbers
+    if crop_source is not None:
+        region["source"] = _numbers(crop_source, "--crop-source", (6,), "the six numbers of a box")
+    vertical: Any = gravity
+    if gravity not in ("known", "unknown", "up"):
+        words = "known, unknown, up, or three numbers along the vertical such as 0,1,0"
+        vertical = _numbers(gravity, "--gravity", (3,), words)
+    told = {
+        "init": init,
+        "max_translation": max_translation,
+        "max_rotation": max_rotation,
+        "gravity": None if gravity == "known" else vertical,
+        "crop": region or None,
+        "scale": scale or None,
+    }
+    return {name: value for name, value in told.items() if value is not None}
+
+
+def _numbers(text: str, option: str, counts: tuple[int, ...], words: str) -> tuple[float, ...]:
+    try:
+        numbers = tuple(float(part) for part in text.split(","))
+    except ValueError:
+        numbers = ()
+    if len(numbers) not in counts:
+        raise ValueError(f"{option} {text}: give {words}")
+    return numbers
+
+
+def selections(
+    topic: str | None, index: str | None, at: str | None, accumulate: str | None
+) -> list[dict[str, Any]]:
+    """What `hybridreg.read` takes, for the source and for the target."""
+    told: list[dict[str, Any]] = [{}, {}]
+    for name, text, kind in (
+        ("topic", topic, str),
+        ("index", index, int),
+        ("at", at, float),
+        ("accumulate", accumulate, int),
+    ):
+        if text is None:
+            continue
+        parts = text.split(",")
+        try:
+            values = [kind(part) for part in parts]
+        except ValueError:
+            values = []
+        if len(values) not in (1, 2):
+            raise ValueError(
+                f"--{name} {text}: give one for both clouds, or the source's and the target's with a comma"
+            )
+        for side, value in zip(told, values * (2 // len(values)), strict=True):
+            if value != "":
+                side[name] = value
+    return told
 
 
 def viewpoint(text: str, option: str) -> Any:

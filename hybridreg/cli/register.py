@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from enum import Enum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
@@ -14,6 +14,7 @@ from hybridreg.cli.command_line_cures import spoken
 from hybridreg.cli.error_messages import VERDICT_FAILED, plainly
 
 if TYPE_CHECKING:
+    from hybridreg.cloud import PointCloud
     from hybridreg.result import RegistrationResult
 
 
@@ -24,16 +25,9 @@ class NonFinite(str, Enum):
     drop = "drop"
 
 
-class Up(str, Enum):
-    """Whether both clouds stand on the same side of their ground."""
-
-    known = "known"
-    unknown = "unknown"
-
-
 @plainly
 def command(
-    source: Annotated[Path, typer.Argument(help="The cloud that moves: ply, pcd, npy, npz, bin, las, txt.")],
+    source: Annotated[Path, typer.Argument(help="The cloud that moves: ply, pcd, npy, las, e57, a bag ...")],
     target: Annotated[Path, typer.Argument(help="The cloud that stays.")],
     image: Annotated[Path | None, typer.Option(help="A photograph of the common view.")] = None,
     preset: options.Preset = None,
@@ -42,27 +36,62 @@ def command(
     voxel: options.Voxel = None,
     seed: options.Seed = 0,
     out: Annotated[Path | None, typer.Option(help="Folder for pose, result, page and picture.")] = None,
+    aligned: Annotated[
+        Path | None, typer.Option(help="Write the source, moved onto the target: ply or pcd.")
+    ] = None,
+    merged: Annotated[Path | None, typer.Option(help="Write both clouds as one: ply or pcd.")] = None,
+    form: options.Format = "matrix",
     nonfinite: Annotated[NonFinite, typer.Option(help="Points that are not finite.")] = NonFinite.refuse,
+    topic: options.Topic = None,
+    index: options.Index = None,
+    at: options.At = None,
+    accumulate: options.Accumulate = None,
     source_viewpoint: options.Viewpoint = "auto",
     target_viewpoint: options.Viewpoint = "auto",
-    gravity: Annotated[Up, typer.Option(help="'unknown' where one cloud may be upside down.")] = Up.known,
+    init: options.Init = None,
+    max_translation: options.MaxTranslation = None,
+    max_rotation: options.MaxRotation = None,
+    gravity: options.Gravity = "known",
+    crop: options.Crop = None,
+    crop_source: options.CropSource = None,
+    scale: options.Scale = False,
 ) -> None:
     """Align two point clouds; print the pose, whether to believe it, and the seconds of each stage."""
     from hybridreg.changes import build
+    from hybridreg.cloud import PointCloud
+    from hybridreg.io.point_files import holds_several
+    from hybridreg.io.recorded.recording import ANY, Selection
+    from hybridreg.output.pose_text import FORMATS
     from hybridreg.pair import Pair
 
-    method = build(options.changes_of(preset, pipeline, settings, voxel))
-    pair = Pair.of(
-        source,
-        target,
-        image,
-        nonfinite="drop" if nonfinite is NonFinite.drop else "raise",
-        source_viewpoint=options.viewpoint(source_viewpoint, "--source-viewpoint"),
-        target_viewpoint=options.viewpoint(target_viewpoint, "--target-viewpoint"),
-        gravity="unknown" if gravity is Up.unknown else "known",
-    )
+    if form not in FORMATS:
+        raise ValueError(f"--format {form}: a pose is written as {', '.join(FORMATS)}")
+    for path in (aligned, merged):
+        if path is not None and path.suffix.lower() not in (".ply", ".pcd"):
+            raise ValueError(f"{path}: clouds are written as .ply or .pcd; choose such a name")
+    changes = options.changes_of(preset, pipeline, settings, voxel)
+    known = options.prior(init, max_translation, max_rotation, gravity, crop, crop_source, scale)
+    if known:
+        changes["prior"] = {**changes.get("prior", {}), **known}
+    method = build(changes)
+    select = options.selections(topic, index, at, accumulate)
+    missing: Literal["raise", "drop"] = "drop" if nonfinite is NonFinite.drop else "raise"
+    clouds = [
+        PointCloud.of(
+            path,
+            name=name,
+            nonfinite=missing,
+            viewpoint=options.viewpoint(place, f"--{name}-viewpoint"),
+            select=Selection(**choice) if holds_several(path) else ANY,
+        )
+        for name, path, place, choice in zip(
+            ("source", "target"), (source, target), (source_viewpoint, target_viewpoint), select, strict=True
+        )
+    ]
+    pair = Pair.of(*clouds, image)
     result = method.run(pair, seed=seed)
-    show(result)
+    show(result, form)
+    write_clouds(clouds, result, aligned, merged)
     if out is not None:
         from hybridreg.eval.report import single_report
 
@@ -72,14 +101,37 @@ def command(
         raise typer.Exit(VERDICT_FAILED)
 
 
-def show(result: RegistrationResult) -> None:
-    """Print a result."""
-    print("T_target_source, metres:")
-    for row in result.transformation:
-        print("  " + " ".join(f"{value:14.9f}" for value in row))
+def write_clouds(
+    clouds: list[PointCloud], result: RegistrationResult, aligned: Path | None, merged: Path | None
+) -> None:
+    """Write the aligned source, and both clouds as one, in the target's coordinates."""
+    import numpy as np
+
+    from hybridreg.io import write_points
+
+    source, target = clouds
+    if aligned is not None:
+        write_points(aligned, result.apply(source))
+        print(f"written: {aligned}")
+    if merged is not None:
+        write_points(merged, np.vstack([target.points + target.offset, result.apply(source)]))
+        print(f"written: {merged}")
+
+
+def show(result: RegistrationResult, form: str = "matrix") -> None:
+    """Print a result, its pose in one of `hybridreg.output.pose_text.FORMATS`."""
+    if form == "matrix":
+        print("T_target_source, metres:")
+        for row in result.transformation:
+            print("  " + " ".join(f"{value:14.9f}" for value in row))
+    else:
+        print(f"T_target_source, metres, as {form}:")
+        print(result.format(form))
+    if result.scale_verdict is not None:
+        print(f"scale: {result.scale:.5g} ({result.scale_verdict}); multiply the source by it first")
     print(f"verdict: {result.verdict} (confidence {result.confidence:.2f})")
     for reason in result.reasons:
-        print(f"  - {reason}")
+        print(f"  - {spoken(reason)}")
     for note in result.notes:
         print(f"note: {spoken(note)}")
     stages = ", ".join(f"{stage} {seconds:.3f}" for stage, seconds in result.seconds.items())

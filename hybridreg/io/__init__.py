@@ -3,7 +3,7 @@
 
 from hybridreg.io.atomic import atomic_path, write_bytes, write_text
 from hybridreg.io.formats.image import as_image, check_image, read_image
-from hybridreg.io.point_files import read_points, read_viewpoint
+from hybridreg.io.point_files import read_points, read_recorded, read_viewpoint
 from hybridreg.io.write import write_json, write_matrix, write_points
 
 __all__ = [
@@ -12,6 +12,7 @@ __all__ = [
     "check_image",
     "read_image",
     "read_points",
+    "read_recorded",
     "read_viewpoint",
     "write_bytes",
     "write_json",

@@ -18,26 +18,32 @@ from hybridreg.io.formats.npz import parse_npz
 from hybridreg.io.formats.pcd import parse_pcd, pcd_viewpoint
 from hybridreg.io.formats.ply import parse_ply
 from hybridreg.io.formats.text import parse_text
+from hybridreg.io.recorded.arrow_tables import read_arrow
+from hybridreg.io.recorded.bag_reader import read_bag
+from hybridreg.io.recorded.e57_scans import read_e57
+from hybridreg.io.recorded.helipr_records import is_helipr, read_helipr
+from hybridreg.io.recorded.lvx2 import read_lvx2
+from hybridreg.io.recorded.mesh_surface import read_mesh
+from hybridreg.io.recorded.recording import ANY, Recorded, Selection
 from hybridreg.io.signatures import kind_of
 from hybridreg.io.whole_files import check_file, read_whole
 
-# Bytes in which the header of a PCD file ends.
-_HEADER = 65_536
+# Bytes in which the header of a PCD file ends, and in which a file shows what it is.
+_HEADER, _OPENING = 65_536, 1024
+# Endings of one format.
+_ALIKE = {".laz": ".las", ".arrow": ".feather"}
+# Endings whose files always begin with their signature; what does not is not given to other people's readers.
+_SIGNED = (".e57", ".bag", ".db3", ".mcap", ".parquet", ".feather", ".glb", ".lvx2")
 
 # Files that hold points or surfaces, and are not read: what to do instead.
-_MESH = "sample its surface first (for example trimesh.load(file, force='mesh').sample(100_000)) and save that as .npy"
-_FRAME = "save it as .csv, or in Python read it with pandas and pass the DataFrame"
 _ELSEWHERE = {
-    ".e57": "export it as .ply or .las, for example with CloudCompare",
     ".ptx": "export it as .ply or .pts, for example with CloudCompare",
     ".rcp": "export it as .pts or .e57 in ReCap, and that as .ply",
-    ".bag": "export one scan of it as .pcd or .npy",
-    ".mcap": "export one scan of it as .pcd or .npy",
     ".pcap": "convert one frame with the sensor's own tool to .csv, .pcd or .las",
+    ".lvx": "convert it with Livox Viewer 2 to .lvx2 or .las",
+    ".vtp": "save it as .ply, for example with ParaView",
     ".mat": "save the array in it as .csv or .npy",
     ".h5": "save the array in it as .npy",
-    **dict.fromkeys((".stl", ".obj", ".off", ".glb", ".gltf"), _MESH),
-    **dict.fromkeys((".feather", ".parquet", ".arrow"), _FRAME),
 }
 
 Parser = Callable[[bytes, str], NDArray[np.float64]]
@@ -54,7 +60,20 @@ PARSERS: dict[str, Parser] = {
     ".las": parse_las,
     ".laz": parse_las,
 }
-"""The reader of each file name ending."""
+"""The reader of each file name ending, of a file's content."""
+
+Reader = Callable[[Path, Selection], Recorded]
+
+READERS: dict[str, Reader] = {
+    **dict.fromkeys((".bag", ".db3", ".mcap"), read_bag),
+    ".e57": read_e57,
+    ".lvx2": read_lvx2,
+    **dict.fromkeys((".feather", ".arrow", ".parquet"), read_arrow),
+    **dict.fromkeys((".obj", ".stl", ".off", ".glb", ".gltf"), read_mesh),
+}
+"""Readers that go to the file themselves, through packages of others; those in which some clouds lie may choose one."""
+
+_SEVERAL = (".bag", ".db3", ".mcap", ".e57", ".lvx2")
 
 
 def read_points(path: str | os.PathLike[str]) -> NDArray[np.float64]:
@@ -63,7 +82,9 @@ def read_points(path: str | os.PathLike[str]) -> NDArray[np.float64]:
     The file name's ending chooses the format: `.ply` (ascii, binary), `.pcd` (ascii, binary,
     binary_compressed), `.bin` (float32 rows of three to six numbers, as KITTI and nuScenes have four and five),
     `.npy`, `.npz` (array `xyz`, `points`, `arr_0` or the only one that fits), text (`.xyz`, `.txt`, `.csv`, `.tsv`,
-    `.asc`, `.pts`, `.xyzn`, `.xyzrgb`, `.xyzi`), `.las`/`.laz` (extra `las`).
+    `.asc`, `.pts`, `.xyzn`, `.xyzrgb`, `.xyzi`), `.las`/`.laz` (extra `las`; COPC too), and what `READERS` lists: bags
+    (extra `ros`), `.e57` (extra `e57`), `.lvx2`, Arrow's tables (extra `arrow`) and meshes (extra `mesh`); of several
+    clouds the first.
     A file that is not what its name says is refused. Rows that are not finite are kept: the gate decides about them.
 
     Parameters
@@ -84,12 +105,39 @@ def read_points(path: str | os.PathLike[str]) -> NDArray[np.float64]:
         The file is damaged, truncated, of an unknown kind, or not what its name says; the message names the
         file, the number that is wrong and the cure.
     ImportError
-        `.las`/`.laz` without laspy.
+        The package that reads it is not installed; the message names the extra that brings it.
+    """
+    return read_recorded(path).points
+
+
+def read_recorded(path: str | os.PathLike[str], selection: Selection = ANY) -> Recorded:
+    """As `read_points`, with where the points were seen from, and one cloud chosen where a file holds several.
+
+    Raises
+    ------
+    ValueError
+        Also where a cloud is chosen from a file that holds one.
     """
     path = Path(path)
+    if path.is_dir() and (path / "metadata.yaml").is_file():
+        return read_bag(path, selection)
     check_file(path)
+    suffix = _suffix(str(path))
+    if selection != ANY and not holds_several(path):
+        raise fault(str(path), f"holds one cloud, {selection} chooses among several", "leave that out")
+    if is_helipr(path):
+        return read_helipr(path, selection)
+    if suffix in READERS:
+        with open(path, "rb") as file:
+            _check_kind(_filled(file.read(_OPENING), str(path)), str(path))
+        return READERS[suffix](path, selection)
     _parser_for(str(path))  # before the reading, which may be long
-    return parse_points(read_whole(path), str(path))
+    return Recorded(parse_points(read_whole(path), str(path)))
+
+
+def holds_several(path: str | os.PathLike[str]) -> bool:
+    """Whether a file may hold several clouds, to choose from by a `Selection`."""
+    return _suffix(os.fspath(path)) in _SEVERAL or Path(path).is_dir()
 
 
 def read_viewpoint(path: str | os.PathLike[str]) -> NDArray[np.float64] | None:
@@ -109,18 +157,26 @@ def read_viewpoint(path: str | os.PathLike[str]) -> NDArray[np.float64] | None:
 def parse_points(data: bytes, name: str) -> NDArray[np.float64]:
     """Read the content `data` of the file called `name`; as `read_points`, without touching the disk."""
     parser = _parser_for(name)
+    _check_kind(_filled(data, name), name)
+    return parser(data, name)
+
+
+def _filled(data: bytes, name: str) -> bytes:
     if not data:
         raise fault(name, "is empty (0 bytes)")
-    _check_kind(data, name)
-    return parser(data, name)
+    return data
 
 
 def _parser_for(name: str) -> Parser:
     suffix = _suffix(name)
+    if suffix in READERS:
+        raise fault(name, f"a {suffix} is read from its file only", "give its path")
     if suffix not in PARSERS:
         cure = f"; {_ELSEWHERE[suffix]}" if suffix in _ELSEWHERE else ""
         raise fault(
-            name, f"there is no reader for {suffix!r}{cure}", f"what is read ends in {', '.join(PARSERS)}"
+            name,
+            f"there is no reader for {suffix!r}{cure}",
+            f"what is read ends in {', '.join([*PARSERS, *READERS])}",
         )
     return PARSERS[suffix]
 
@@ -131,8 +187,11 @@ def _suffix(name: str) -> str:
 
 def _check_kind(data: bytes, name: str) -> None:
     found = kind_of(data)
-    expected = _suffix(name).replace(".laz", ".las")
+    expected = _ALIKE.get(_suffix(name), _suffix(name))
+    if found is None and expected in _SIGNED:
+        raise fault(name, f"does not begin as a file called {expected} does")
     if found is None or found.suffix == expected:
         return
-    cure = f"rename it to end in {found.suffix}" if found.suffix in PARSERS else found.cure
+    readable = found.suffix in PARSERS or found.suffix in READERS
+    cure = f"rename it to end in {found.suffix}" if readable else found.cure
     raise fault(name, f"its content is {found.words}, not what the ending {_suffix(name)} says", cure)

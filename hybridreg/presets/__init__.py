@@ -56,7 +56,7 @@ def write(path: str | os.PathLike[str], slots: dict[str, Any]) -> None:
     from hybridreg.io.atomic import atomic_path
 
     for slot, table in slots.items():
-        if ":" in table["stage"]:
+        if ":" in table.get("stage", ""):
             raise ValueError(
                 f"{slot}: {table['stage']} is not registered, so a file could not name it; register it through the "
                 "entry-point group 'hybridreg.stages'"
@@ -66,7 +66,7 @@ def write(path: str | os.PathLike[str], slots: dict[str, Any]) -> None:
 
 
 def _slots(tables: dict[str, Any], origin: str) -> dict[str, Any]:
-    unknown = set(tables) - {*SLOTS, "voxel"}
+    unknown = set(tables) - {*SLOTS, "voxel", "prior"}
     if unknown:
         raise ValueError(
             f"{origin}: {', '.join(sorted(unknown))} is no slot; the slots are {', '.join(SLOTS)}"

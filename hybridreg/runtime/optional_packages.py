@@ -20,17 +20,20 @@ _DISTRIBUTIONS: dict[str, tuple[str, str, tuple[int, int] | None]] = {
     "embreex": ("embreex", "embree", None),
     "kiss_icp": ("kiss-icp", "kiss", None),
     "kiss_matcher": ("kiss-matcher", "kiss", (3, 12)),
+    "imagecodecs": ("imagecodecs", "pcd", None),
     "laspy": ("laspy", "las", None),
     "lightning_fabric": ("lightning-fabric", "train", None),
     "matplotlib": ("matplotlib", "report", None),
     "open3d": ("open3d", "open3d", None),
     "plotly": ("plotly", "report", None),
     "pye57": ("pye57", "e57", None),
+    "pyarrow": ("pyarrow", "arrow", None),
     "rosbags": ("rosbags", "ros", None),
     "safetensors": ("safetensors", "learned", None),
     "sklearn": ("scikit-learn", "train", None),
     "small_gicp": ("small_gicp", "", None),
     "torch": ("torch", "learned", None),
+    "trimesh": ("trimesh", "mesh", None),
 }
 
 

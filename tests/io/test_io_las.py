@@ -100,3 +100,20 @@ def test_promises_are_compared_in_numbers(utm_cloud):
         parse_las(data[:-10], "a.las")
     with pytest.raises(ValueError, match="holds 100 bytes, a LAS header alone takes 227"):
         parse_las(data[:100], "a.las")
+
+
+def test_copc_is_read_as_what_it_is(tmp_path):
+    copclib = pytest.importorskip("copclib")
+    points = np.round(np.random.default_rng(0).uniform(1, 9, (200, 3)), 3)
+    path = tmp_path / "a.copc.laz"
+    writer = copclib.FileWriter(str(path), copclib.CopcConfigWriter(6, [0.001] * 3, [0, 0, 0]))
+    rows = copclib.Points(writer.copc_config.las_header)
+    for x, y, z in points.tolist():
+        row = rows.CreatePoint()
+        row.x, row.y, row.z = x, y, z
+        rows.AddPoint(row)
+    writer.AddNode(copclib.VoxelKey(0, 0, 0, 0), rows)
+    writer.Close()
+    np.testing.assert_allclose(
+        np.sort(parse_las(path.read_bytes(), "a.copc.laz"), axis=0), np.sort(points, axis=0), atol=1e-9
+    )

@@ -1,0 +1,91 @@
+# SPDX-License-Identifier: MIT
+"""Which cloud of a file that holds several, and what a reader of one gives back."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from numbers import Integral
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hybridreg.io.faults import fault
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Selection:
+    """Which cloud of a file.
+
+    Parameters
+    ----------
+    topic : str or None
+        Of a bag; None takes its only topic of clouds.
+    index : int or None
+        Counted from 0: the message of a bag, the scan of an E57 file, the frame of an LVX2 file; negative from the end.
+    at : float or None
+        Seconds after the bag's first message: the first cloud from then on.
+    accumulate : int
+        So many clouds that follow one another are laid together as they are: for a sensor that stood still (a Livox
+        needs a second to fill its view), as nobody tells how it moved.
+
+    Raises
+    ------
+    ValueError
+        `index` and `at` together, no whole number, or a count below one.
+    """
+
+    topic: str | None = None
+    index: int | None = None
+    at: float | None = None
+    accumulate: int = 1
+
+    def __post_init__(self) -> None:
+        if self.index is not None and self.at is not None:
+            raise ValueError(f"index={self.index} and at={self.at}: leave one of them out")
+        if self.index is not None and (isinstance(self.index, bool) or not isinstance(self.index, Integral)):
+            raise ValueError(f"index={self.index!r} must be a whole number, 0 for the first")
+        if self.at is not None and not (isinstance(self.at, (int, float)) and 0.0 <= self.at < np.inf):
+            raise ValueError(f"at={self.at!r} must be seconds after the start, 0 or more")
+        if (
+            isinstance(self.accumulate, bool)
+            or not isinstance(self.accumulate, Integral)
+            or self.accumulate < 1
+        ):
+            raise ValueError(f"accumulate={self.accumulate!r} must be a whole number, 1 or more")
+
+    def first_of(self, count: int, name: str, what: str) -> int:
+        """The row that `index` means among `count`, with `accumulate` of them from there on.
+
+        Raises
+        ------
+        ValueError
+            There are not so many.
+        """
+        index = self.index or 0
+        first = index + count if index < 0 else index
+        if not 0 <= first < count or first + self.accumulate > count:
+            asked = f"index {index}" + (f" and {self.accumulate - 1} after it" if self.accumulate > 1 else "")
+            raise fault(name, f"holds {count} {what}, {asked} was asked for", f"choose from 0 to {count - 1}")
+        return first
+
+
+ANY = Selection()
+
+
+class Recorded(NamedTuple):
+    """A cloud as its file tells it.
+
+    points : (N, 3) float64, metres
+    places : (k, 3) where it was seen from, in the same frame; none for what nobody saw (a mesh); None where the file
+        does not tell
+    of_point : (N,) row of each point's place, where there are several
+    holed : whether missing returns are part of the format, so that they are left out without being asked
+    """
+
+    points: Array
+    places: Array | None = None
+    of_point: NDArray[np.int64] | None = None
+    holed: bool = False

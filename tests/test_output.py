@@ -1,0 +1,195 @@
+# SPDX-License-Identifier: MIT
+"""Poses and clouds as other tools read them; results in words, pictures and numbers."""
+
+from __future__ import annotations
+
+import dataclasses
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+from typer.testing import CliRunner
+
+import hybridreg as hr
+from hybridreg import testing
+from hybridreg.cli.app import app
+from hybridreg.geometry import se3
+from hybridreg.io import read_points, write_points
+from hybridreg.output import pose_text
+from hybridreg.output.covariance import of_information
+
+POSES = [
+    np.eye(4),
+    se3.from_rt(se3.rotation_about(np.array([0.3, -1.2, 2.5])), np.array([4.0, -5.5, 0.25])),
+    se3.from_rt(se3.rotation_about(np.array([np.pi, 0.0, 0.0])), np.array([5e5, 4e6, 100.0])),
+    se3.from_rt(se3.rotation_about(np.array([0.0, np.pi / 2, 0.0])), np.zeros(3)),
+]
+
+
+@pytest.fixture(scope="module")
+def result() -> tuple[hr.RegistrationResult, hr.Pair, np.ndarray]:
+    pair, truth = testing.sample_pair()
+    return hr.Pipeline.preset("birdseye-gicp").run(pair), pair, truth
+
+
+def numbers(text: str) -> np.ndarray:
+    return np.array([float(each) for each in text.split()])
+
+
+@pytest.mark.parametrize("T", POSES)
+def test_every_format_holds_the_whole_pose(T: np.ndarray) -> None:
+    text = {form: pose_text.pose_text(T, form) for form in pose_text.FORMATS}
+    for form in ("matrix", "cloudcompare"):
+        np.testing.assert_array_equal(np.loadtxt(text[form].splitlines()), T)
+    np.testing.assert_array_equal(numbers(text["kitti"]).reshape(3, 4), T[:3])
+    tum, plain = numbers(text["tum"]), numbers(text["quaternion"])
+    np.testing.assert_array_equal(tum[1:], plain)
+    ros = np.array([float(x) for x in re.findall(r"--q?[xyzw] (\S+)", text["ros-tf"])])
+    np.testing.assert_array_equal(ros, plain)
+    assert text["ros-tf"].endswith("--frame-id target --child-frame-id source")
+    np.testing.assert_array_equal(plain[:3], T[:3, 3])
+    np.testing.assert_allclose(Rotation.from_quat(plain[3:]).as_matrix(), T[:3, :3], atol=1e-12)
+    xyz, rpy = re.fullmatch(r'<origin xyz="(.*)" rpy="(.*)"/>', text["urdf"]).groups()  # type: ignore[union-attr]
+    np.testing.assert_array_equal(numbers(xyz), T[:3, 3])
+    np.testing.assert_allclose(Rotation.from_euler("xyz", numbers(rpy)).as_matrix(), T[:3, :3], atol=1e-9)
+
+
+@pytest.mark.parametrize("T", POSES)
+def test_trimesh_reads_the_angles_of_urdf(T: np.ndarray) -> None:
+    trimesh = pytest.importorskip("trimesh")
+    xyz_rpy = re.findall(r'"([^"]*)"', pose_text.pose_text(T, "urdf"))
+    M = trimesh.transformations.euler_matrix(*numbers(xyz_rpy[1]), axes="sxyz")
+    np.testing.assert_allclose(M[:3, :3], T[:3, :3], atol=1e-9)
+
+
+@pytest.mark.parametrize("T", POSES)
+def test_evo_reads_trajectories(T: np.ndarray, tmp_path: Path) -> None:
+    evo = pytest.importorskip("evo.tools.file_interface")
+    for form in ("kitti", "tum"):
+        (tmp_path / form).write_text(pose_text.pose_text(T, form) + "\n")
+    np.testing.assert_allclose(evo.read_kitti_poses_file(tmp_path / "kitti").poses_se3[0], T)
+    np.testing.assert_allclose(evo.read_tum_trajectory_file(tmp_path / "tum").poses_se3[0], T, atol=1e-9)
+
+
+def test_an_unknown_format_lists_the_known() -> None:
+    with pytest.raises(ValueError, match="format='euler': a pose is written as matrix, quaternion, ros-tf"):
+        pose_text.pose_text(np.eye(4), "euler")
+
+
+def test_apply_takes_what_register_takes(result: Any, tmp_path: Path) -> None:
+    found, pair, _ = result
+    points = pair.source.points
+    wanted = se3.apply(found.transformation, points)
+    np.testing.assert_array_equal(found.apply(points), wanted)
+    np.testing.assert_array_equal(found.apply(pair.source), wanted)
+    np.testing.assert_array_equal(found.apply(np.column_stack([points, points[:, 0]])), wanted)
+    np.save(tmp_path / "a.npy", points)
+    np.testing.assert_array_equal(found.apply(tmp_path / "a.npy"), wanted)
+    far = hr.PointCloud.of(points + [4e6, 3e5, 0.0])
+    np.testing.assert_allclose(found.apply(far), found.apply(points + [4e6, 3e5, 0.0]), atol=1e-6)
+    np.testing.assert_allclose(dataclasses.replace(found, scale=2.0).apply(points), found.apply(2.0 * points))
+    with pytest.raises(ValueError, match=r"points: expected an array of shape \(N, 3\), got \(4,\)"):
+        found.apply(np.zeros(4))
+
+
+def test_words_and_pictures(result: Any) -> None:
+    found, pair, _ = result
+    text = found.summary()
+    assert text.startswith(f"{found.verdict} (confidence")
+    for each in (*found.reasons, *found.notes):
+        assert each in text
+    assert "one standard deviation" in text
+    odd = dataclasses.replace(
+        found, verdict="failed", reasons=("a < b & c",), scale=2.0, scale_verdict="doubtful"
+    )
+    page = odd._repr_html_()
+    assert "a &lt; b &amp; c" in page
+    assert "scale 2 (doubtful)" in page
+    assert "one standard deviation" not in odd.summary()
+    pytest.importorskip("plotly")
+    figure = found.plot()
+    clouds = {trace.name: np.column_stack([trace.x, trace.y, trace.z]) for trace in figure.data}
+    assert len(clouds["target"]) <= 2 * 50_000
+    np.testing.assert_allclose(clouds["source, before"][0], pair.source.points[0], atol=1e-3)
+    np.testing.assert_allclose(
+        clouds["source, aligned"][0], found.apply(pair.source.points[:1])[0], atol=1e-3
+    )
+
+
+def test_covariance_is_that_of_the_information_about_the_centre(result: Any) -> None:
+    found, pair, _ = result
+    covariance = found.covariance
+    assert np.allclose(covariance, covariance.T)
+    assert (np.linalg.eigvalsh(covariance) > 0.0).all()
+    low, high = pair.target.bounds
+    assert ((found.centre >= low) & (found.centre <= high)).all()
+    # A map's offset moves the centre, and nothing else.
+    shift = np.array([500_000.0, 4_000_000.0, 0.0])
+    far = hr.Pipeline.preset("birdseye-gicp")(pair.source.points, pair.target.points + shift)
+    np.testing.assert_allclose(far.centre, found.centre + shift, atol=0.1)
+    np.testing.assert_allclose(far.covariance, covariance, rtol=0.2, atol=1e-8)
+
+
+def test_what_nothing_holds_is_infinitely_uncertain() -> None:
+    held = np.diag([100.0, 100.0, 100.0, 50.0, 50.0, 0.0])
+    covariance = of_information(held)
+    assert np.isinf(covariance[5, 5])
+    assert np.isfinite(np.delete(np.delete(covariance, 5, 0), 5, 1)).all()
+    assert np.isinf(np.diag(of_information(np.zeros((6, 6))))).all()
+
+
+@pytest.mark.parametrize("ending", ["ply", "pcd"])
+def test_the_command_line_writes_clouds(tmp_path: Path, ending: str) -> None:
+    pair, truth = testing.sample_pair()
+    for name, cloud in (("a", pair.source), ("b", pair.target)):
+        write_points(tmp_path / f"{name}.ply", cloud.points)
+    aligned, merged = tmp_path / f"aligned.{ending}", tmp_path / f"merged.{ending}"
+    call = ["register", str(tmp_path / "a.ply"), str(tmp_path / "b.ply"), "--format", "tum"]
+    done = CliRunner().invoke(app, [*call, "--aligned", str(aligned), "--merged", str(merged)])
+    assert done.exit_code == 0, done.output
+    lines = done.stdout.splitlines()
+    pose = numbers(lines[1])
+    T = se3.from_rt(Rotation.from_quat(pose[4:]).as_matrix(), pose[1:4])
+    assert np.abs(T - truth).max() < 0.1
+    np.testing.assert_allclose(read_points(aligned), se3.apply(T, pair.source.points), atol=1e-4)
+    assert len(read_points(merged)) == len(pair.source) + len(pair.target)
+    for wrong in (["--format", "euler"], ["--aligned", "a.obj"], ["--merged", "a"]):
+        done = CliRunner().invoke(app, [*call, *wrong])
+        assert done.exit_code == 2
+        assert wrong[1] in done.stderr
+
+
+@pytest.mark.parametrize("ending", ["ply", "pcd"])
+def test_pcl_and_open3d_read_what_is_written(result: Any, tmp_path: Path, ending: str) -> None:
+    found, pair, _ = result
+    path = tmp_path / f"a.{ending}"
+    moved = found.apply(pair.source)
+    write_points(path, moved)
+    read = []
+    try:
+        from hybridreg.runtime.open3d import load_open3d
+
+        read.append(np.asarray(load_open3d().io.read_point_cloud(str(path)).points))
+    except ImportError:
+        pass
+    if ending == "pcd":
+        try:
+            from pypcd4 import PointCloud
+
+            read.append(PointCloud.from_path(path).numpy(("x", "y", "z")))
+        except ImportError:
+            pass
+    else:
+        try:
+            import trimesh
+
+            read.append(np.asarray(trimesh.load(path).vertices))
+        except ImportError:
+            pass
+    if not read:
+        pytest.skip("none of them is here")
+    for each in read:
+        np.testing.assert_allclose(each, moved, atol=1e-4)

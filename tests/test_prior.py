@@ -1,0 +1,233 @@
+# SPDX-License-Identifier: MIT
+"""What is known beforehand narrows the search, and the verdict knows it."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+import hybridreg as hr
+from hybridreg import testing
+from hybridreg.cli.app import app
+from hybridreg.data.loaders.folder import load_pair
+from hybridreg.geometry import se3
+from hybridreg.io import write_matrix, write_points
+
+DEMO = Path(hr.__file__).parent / "data" / "demo"
+
+
+@pytest.fixture(scope="module")
+def demo() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Source and target (N, 3) of the demo pair, and its true pose."""
+    labelled = load_pair(DEMO)
+    return labelled.pair.source.points, labelled.pair.target.points, labelled.T_target_source
+
+
+def off(T: np.ndarray, truth: np.ndarray) -> tuple[float, float]:
+    """Degrees and metres between two poses."""
+    step = se3.inverse(T) @ truth
+    return se3.angle_deg(step[:3, :3]), float(np.linalg.norm(step[:3, 3]))
+
+
+def near(T: np.ndarray, truth: np.ndarray, degrees: float = 1.0, metres: float = 0.2) -> bool:
+    turned, moved = off(T, truth)
+    return turned < degrees and moved < metres
+
+
+ROUGH = se3.from_rt(se3.rotation_about(np.radians([2.0, -1.0, 8.0])), np.array([1.0, -0.8, 0.2]))
+
+
+def test_a_start_is_searched_around_and_bounds_hold(demo: Any) -> None:
+    source, target, truth = demo
+    result = hr.register(source, target, init=ROUGH @ truth, max_translation=4.0, max_rotation=15.0)
+    assert result.verdict == "ok"
+    assert near(result.transformation, truth)
+    assert "prior" in result.seconds
+    assert (result.scale, result.scale_verdict) == (1.0, None)
+    assert result.spec["prior"]["max_rotation"] == 15.0
+    assert hr.Pipeline.preset("icp")(source, target).verdict != "ok"
+    from_start = hr.Pipeline.preset("icp").swap(prior={"init": truth})(source, target)
+    assert near(from_start.transformation, truth, 3.0, 0.6)
+
+
+@pytest.mark.parametrize(
+    "bound, word",
+    [({"max_translation": 0.5}, "max_translation=0.5"), ({"max_rotation": 5.0}, "max_rotation=5")],
+)
+def test_a_pose_beyond_the_bounds_is_none(demo: Any, bound: dict[str, float], word: str) -> None:
+    source, target, _ = demo
+    for preset in ("default", "birdseye-gicp"):
+        result = hr.register(source, target, preset=preset, **bound)  # type: ignore[arg-type]
+        assert result.verdict == "failed", preset
+        assert all(
+            np.linalg.norm(T[:3, 3]) < 20.0 and se3.angle_deg(T[:3, :3]) <= 5.01
+            for T in result.rivals
+            if "max_rotation" in bound
+        )
+    assert any(word in reason for reason in result.reasons), result.reasons
+
+
+def test_bounds_leave_one_of_two_alike_poses() -> None:
+    # A square hall: four quarter turns explain it equally well, and a bound tells which is meant.
+    rng = np.random.default_rng(0)
+    hall = rng.uniform(-8.0, 8.0, (30_000, 3)) * [1.0, 1.0, 0.25]
+    side = rng.integers(0, 6, len(hall))
+    for k in range(3):
+        hall[side == 2 * k, k], hall[side == 2 * k + 1, k] = -(8.0, 8.0, 2.0)[k], (8.0, 8.0, 2.0)[k]
+    truth = se3.from_rt(se3.yaw(20.0)[:3, :3], np.array([0.6, -0.3, 0.1]))
+    source, target = se3.apply(se3.inverse(truth), hall[::2]), hall[1::2]
+    free = hr.register(source, target)
+    bound = hr.register(source, target, max_rotation=40.0)
+    assert free.verdict != "ok"
+    assert near(bound.transformation, truth)
+    assert len(bound.rivals) < len(free.rivals)
+    assert bound.confidence > free.confidence
+
+
+@pytest.mark.parametrize("gravity", ["up", (0.0, 0.0, 2.0), ((0, 0, 1), (0, 0, 1)), (0.0, 0.0, -9.81)])
+def test_gravity_up(demo: Any, gravity: Any) -> None:
+    source, target, truth = demo
+    result = hr.register(source, target, gravity=gravity)
+    assert result.verdict == "ok"
+    assert near(result.transformation, truth)
+
+
+def test_gravity_of_tilted_frames_is_told_and_undone(demo: Any) -> None:
+    source, target, truth = demo
+    S = se3.from_rt(se3.rotation_about(np.radians([70.0, 10.0, 0.0])), np.array([3.0, 1.0, 0.0]))
+    G = se3.from_rt(se3.rotation_about(np.radians([0.0, 90.0, 0.0])), np.zeros(3))
+    turned = se3.apply(S, source), se3.apply(G, target)
+    wanted = G @ truth @ se3.inverse(S)
+    result = hr.register(*turned, gravity=(S[:3, 2], G[:3, 2]))
+    assert result.verdict == "ok"
+    assert near(result.transformation, wanted)
+    # The information lies along the target's own axes: that of the upright clouds, turned.
+    upright = hr.register(source, target).information
+    turn = np.kron(np.eye(2), G[:3, :3])
+    assert np.allclose(
+        result.information, turn @ upright @ turn.T, rtol=0.2, atol=0.05 * np.abs(upright).max()
+    )
+    wrong = hr.register(*turned, gravity=(S[:3, 0], G[:3, 2]))
+    assert wrong.verdict == "failed"
+
+
+def test_a_region_of_a_map(demo: Any) -> None:
+    source, target, truth = demo
+    far = target + [4_500_000.0, 300_000.0, 0.0]
+    wanted = se3.from_rt(np.eye(3), np.array([4_500_000.0, 300_000.0, 0.0])) @ truth
+    by_radius = hr.register(source, far, init=wanted, crop=30.0)
+    assert near(by_radius.transformation, wanted)
+    low, high = far.min(axis=0), far.max(axis=0)
+    low[0] += 10.0
+    by_box = hr.register(source, far, crop=(*low, *high))
+    assert near(by_box.transformation, wanted)
+    assert by_box.correspondence_set[:, 1].max() < (far[:, 0] >= low[0]).sum()
+    both = hr.register(source, far, crop={"source": (-80, -80, -80, 80, 80, 80), "target": [low, high]})
+    assert near(both.transformation, wanted)
+
+
+@pytest.mark.parametrize("factor", [1.0, 1.37, 1000.0])
+def test_scale_is_estimated(demo: Any, factor: float) -> None:
+    source, target, truth = demo
+    result = hr.register(source / factor, target, scale=True)
+    assert result.verdict == "ok"
+    assert result.scale_verdict == "ok"
+    assert result.scale == pytest.approx(factor, rel=0.003)
+    assert near(result.transformation, truth)
+
+
+@pytest.mark.parametrize(
+    "wrong, word",
+    [
+        ({"init": np.eye(3)}, r"init: expected shape \(4, 4\)"),
+        ({"init": np.diag([2.0, 2.0, 2.0, 1.0])}, "init: .*no rotation"),
+        ({"init": "nowhere.txt"}, "nowhere.txt"),
+        ({"max_translation": 0.0}, "max_translation=0.0 must be a positive"),
+        ({"max_translation": np.nan}, "max_translation=nan"),
+        ({"max_rotation": "ten"}, "max_rotation='ten'"),
+        ({"max_rotation": True}, "max_rotation=True"),
+        ({"gravity": "down"}, "gravity='down' must be"),
+        ({"gravity": (0, 0, 0)}, "gravity="),
+        ({"gravity": (0, 1)}, "gravity="),
+        ({"crop": -3.0}, "crop=-3.0"),
+        ({"crop": (1, 2, 3)}, "crop="),
+        ({"crop": (5, 5, 5, 1, 1, 1)}, "crop="),
+        ({"crop": {"map": (0, 0, 0, 1, 1, 1)}}, "crop="),
+        (
+            {"crop": (900, 900, 900, 901, 901, 901)},
+            r"target: crop: .* holds 0 of its \d+ points, fewer than 20",
+        ),
+        ({"crop": {"source": (900, 900, 900, 901, 901, 901)}}, "source: crop"),
+        ({"scale": 2.0}, "scale=2.0 must be True or False"),
+    ],
+)
+def test_what_is_no_knowledge_is_refused(demo: Any, wrong: dict[str, Any], word: str) -> None:
+    source, target, _ = demo
+    with pytest.raises((ValueError, FileNotFoundError), match=word):
+        hr.register(source, target, **wrong)
+
+
+def test_rows_of_matches_do_not_go_with_a_region(demo: Any) -> None:
+    source, target, _ = demo
+    pipe = hr.Pipeline(match="given", estimate="svd", voxel=0.5, prior={"crop": 100.0})
+    with pytest.raises(ValueError, match="rows of points do not go with crop"):
+        pipe.run(hr.Pair.of(source, target), matches=np.zeros((5, 2), dtype=int))
+
+
+def test_matches_of_the_user_are_moved_along() -> None:
+    pair, truth = testing.sample_pair()
+    points = pair.source.points[::50]
+    matches = hr.Correspondences.of(points, se3.apply(truth, points))
+    pipe = hr.Pipeline(match="given", estimate="svd", refine="none", voxel=0.4, prior={"init": ROUGH @ truth})
+    result = pipe.run(pair, matches=matches)
+    assert near(result.transformation, truth, 0.01, 0.01)
+    assert np.allclose(result.matches.source, points)
+
+
+def test_it_stands_in_files_and_tables(demo: Any, tmp_path: Path) -> None:
+    source, target, truth = demo
+    pipe = hr.Pipeline.preset("icp").swap(
+        prior={"init": truth, "max_rotation": 9, "crop": 60.0, "gravity": "up"}
+    )
+    pipe.save(tmp_path / "mine.toml")
+    again = hr.Pipeline.load(tmp_path / "mine.toml")
+    assert again == pipe
+    assert near(again(source, target).transformation, truth, 3.0, 0.6)
+    write_matrix(tmp_path / "start.txt", truth)
+    (tmp_path / "hand.toml").write_text(
+        f'[prior]\ninit = "{(tmp_path / "start.txt").as_posix()}"\nscale = false\n'
+    )
+    assert hr.Pipeline.load(tmp_path / "hand.toml").prior.init == pipe.prior.init
+    (tmp_path / "wrong.toml").write_text("[prior]\nmax_tilt = 3\n")
+    with pytest.raises(ValueError, match="max_tilt"):
+        hr.Pipeline.load(tmp_path / "wrong.toml")
+    from hybridreg.changes import build, parse
+
+    assert build({"preset": "icp", **parse(["prior.max_rotation=20"])}).prior.max_rotation == 20
+
+
+def test_the_command_line(demo: Any, tmp_path: Path) -> None:
+    source, target, truth = demo
+    write_points(tmp_path / "a.ply", source)
+    write_points(tmp_path / "b.ply", target)
+    (tmp_path / "start.json").write_text(json.dumps({"transformation": (ROUGH @ truth).tolist()}))
+    call = ["register", str(tmp_path / "a.ply"), str(tmp_path / "b.ply")]
+    told = [*call, "--init", str(tmp_path / "start.json"), "--max-translation", "4", "--max-rotation", "15"]
+    done = CliRunner().invoke(
+        app, [*told, "--gravity", "up", "--crop", "80", "--crop-source", "-90,-90,-9,90,90,40"]
+    )
+    assert done.exit_code == 0, done.output
+    T = np.array([[float(x) for x in line.split()] for line in done.stdout.splitlines()[1:5]])
+    assert near(T, truth)
+    done = CliRunner().invoke(app, [*call, "--preset", "birdseye-gicp", "--max-rotation", "5"])
+    assert done.exit_code == 3
+    assert "--max-rotation 5" in done.output
+    for wrong in (["--crop", "1,2"], ["--gravity", "down"], ["--max-rotation", "-3"], ["--init", "gone.txt"]):
+        done = CliRunner().invoke(app, [*call, *wrong])
+        assert done.exit_code == 2, wrong
+        assert wrong[0] in done.stderr or wrong[1] in done.stderr
