@@ -6,7 +6,7 @@ from hybridreg.eval.run.row import Row
 from hybridreg.eval.run.store import Predictions, read
 from hybridreg.eval.score.protocols import PROTOCOLS, Protocol, protocol
 from hybridreg.eval.score.scoring import Score, score
-from hybridreg.eval.table import Table
+from hybridreg.eval.scored_table import Table
 
 __all__ = [
     "PROTOCOLS",

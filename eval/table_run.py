@@ -15,7 +15,7 @@ from hybridreg.eval.run import store
 from hybridreg.eval.run.prediction import predict
 from hybridreg.eval.run.row import Row
 from hybridreg.eval.score import paper, scoring
-from hybridreg.eval.table import IDENTITY, Entry, Table
+from hybridreg.eval.scored_table import IDENTITY, Entry, Table
 from hybridreg.eval.table_file import Recipe, slug
 from hybridreg.io import write_json
 from hybridreg.io.lock import folder_lock

@@ -17,7 +17,7 @@ from hybridreg.eval.run.row import Row
 from hybridreg.eval.score import errors
 from hybridreg.eval.score.protocols import Protocol
 from hybridreg.eval.score.scoring import identity
-from hybridreg.eval.table import Entry, Table
+from hybridreg.eval.scored_table import Entry, Table
 from hybridreg.io import write_text
 from hybridreg.pair import LabelledPair
 

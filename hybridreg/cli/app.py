@@ -5,7 +5,19 @@ from __future__ import annotations
 
 import typer
 
-from hybridreg.cli import datasets, demo, doctor, evaluate, listing, register, report, simulate, table, train
+from hybridreg.cli import (
+    datasets,
+    demo,
+    doctor,
+    evaluate,
+    figure,
+    listing,
+    register,
+    report,
+    simulate,
+    table,
+    train,
+)
 
 app = typer.Typer(
     name="hybridreg",
@@ -18,6 +30,7 @@ app.command("register")(register.command)
 app.command("eval")(evaluate.command)
 app.command("table")(table.command)
 app.command("report")(report.command)
+app.command("figure")(figure.command)
 app.command("train")(train.command)
 app.command("simulate")(simulate.command)
 app.command("list")(listing.command)

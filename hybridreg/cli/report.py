@@ -14,7 +14,7 @@ from hybridreg.cli.error_messages import plainly
 
 if TYPE_CHECKING:
     from hybridreg.eval.score.protocols import Protocol
-    from hybridreg.eval.table import Table
+    from hybridreg.eval.scored_table import Table
     from hybridreg.pair import LabelledPair
 
 

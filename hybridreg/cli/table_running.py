@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
     from hybridreg.eval.report.table_columns import Cells
     from hybridreg.eval.score.protocols import Protocol
-    from hybridreg.eval.table import Table
+    from hybridreg.eval.scored_table import Table
     from hybridreg.eval.table_file import Recipe
     from hybridreg.pair import LabelledPair
 
@@ -91,5 +91,7 @@ def print_table(caption: str, lines: Sequence[Cells]) -> None:
         grid.add_column(Text(shown(key)), justify="left" if key == "method" else "right", no_wrap=True)
     for line in lines:
         grid.add_row(*(Text(shown(cell)) for cell in line.values()))
-    console = Console(width=None if sys.stdout.isatty() else 240)
+    wide = Console(width=10_000)
+    fitting = max(240, wide.measure(grid).maximum)
+    console = Console(width=None if sys.stdout.isatty() else fitting)
     console.print(grid)
