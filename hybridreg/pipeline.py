@@ -21,10 +21,9 @@ from hybridreg.matches import Correspondences, Overlap, Pose
 from hybridreg.pair import Pair
 from hybridreg.resolution import tolerance
 from hybridreg.result import RegistrationResult
-from hybridreg.returned import checked
 from hybridreg.runtime.resources import peak_memory_mb, reset_peak_memory, stopwatch
 from hybridreg.scene import Scene
-from hybridreg.slots import SLOTS
+from hybridreg.slots import SLOTS, checked
 from hybridreg.stage import Stage, own_params
 
 

@@ -22,7 +22,6 @@ ORDER = (
         "matches",
         "pair",
         "resolution",
-        "returned",
         "scene",
         "slots",
         "stage",
