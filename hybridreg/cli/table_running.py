@@ -47,6 +47,8 @@ def run(recipe: Recipe, data: str, out: Path, *, workers: int, overwrite: bool) 
             on_row=lambda name, _: progress.advance(bars[name]),
         )
     write(done, recipe.protocols, out, with_starts(pairs, recipe.starts, recipe.seed))
+    if failure := done.failure():
+        raise ValueError(failure)
 
 
 def with_starts(pairs: Sequence[LabelledPair], starts: int, seed: int) -> Sequence[LabelledPair]:

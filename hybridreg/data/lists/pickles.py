@@ -110,6 +110,24 @@ def _no_bytes() -> bytes:
     return b""  # how Python 2's protocols spell an empty array's content
 
 
+def _storage(data: bytes) -> NDArray[Any]:
+    # What PyTorch writes for the numbers of a tensor is an archive of its own; its reader for weights runs nothing.
+    import torch
+
+    held = torch.load(io.BytesIO(data), weights_only=True)
+    return np.asarray(torch.tensor([], dtype=held.dtype).set_(held))
+
+
+def _tensor(
+    storage: NDArray[Any], offset: int, size: tuple[int, ...], stride: tuple[int, ...], *_: Any
+) -> Any:
+    steps = sum((n - 1) * step for n, step in zip(size, stride, strict=True)) if all(size) else -1
+    if min((offset, *size, *stride)) < 0 or offset + steps >= len(storage):
+        raise ValueError("a tensor reaches beyond its numbers")
+    flat = storage[offset:]
+    return np.lib.stride_tricks.as_strided(flat, size, [step * flat.itemsize for step in stride]).copy()
+
+
 _STAND_INS: dict[str, Any] = {
     "numpy.core.multiarray._reconstruct": _empty_array,
     "numpy.core.multiarray.scalar": _number,
@@ -119,4 +137,7 @@ _STAND_INS: dict[str, Any] = {
     "_codecs.encode": _latin1,
     "__builtin__.bytes": _no_bytes,
     "builtins.bytes": _no_bytes,
+    "torch.storage._load_from_bytes": _storage,
+    "torch._utils._rebuild_tensor_v2": _tensor,
+    "collections.OrderedDict": dict,
 }
