@@ -38,7 +38,7 @@ def load(stream: io.BytesIO, name: str) -> Any:
     with foreign_parser(name, "a pickle"):
         try:
             return PlainUnpickler(stream).load()
-        except _Forbidden as error:
+        except Forbidden as error:
             refused = error.name
     cure = "take the file from where the data set's authors publish it; nothing of it was run"
     raise fault(name, f"asks for {refused}, which a table of numpy arrays has no use for", cure)
@@ -58,7 +58,9 @@ def globals_of(data: bytes) -> set[str]:
     return found
 
 
-class _Forbidden(Exception):
+class Forbidden(Exception):
+    """A pickle asks for what no table has a use for."""
+
     def __init__(self, name: str) -> None:
         super().__init__(name)
         self.name = name
@@ -77,12 +79,12 @@ class PlainUnpickler(pickle.Unpickler):
     def find_class(self, module: str, name: str) -> Any:
         full = f"{module}.{name}".replace("numpy._core", "numpy.core")
         if full not in _STAND_INS:
-            raise _Forbidden(f"{module}.{name}")
+            raise Forbidden(f"{module}.{name}")
         # A fresh wrapper, as a pickle may also set attributes of what it was given.
         return partial(_STAND_INS[full])
 
     def persistent_load(self, pid: Any) -> Any:
-        raise _Forbidden("an object kept outside the pickle (a torch tensor's storage?)")
+        raise Forbidden("an object kept outside the pickle (a torch tensor's storage?)")
 
 
 def _empty_array(*_: Any) -> NDArray[Any]:
