@@ -10,12 +10,13 @@ from pathlib import Path
 from typing import Any
 
 from hybridreg.config.plain_values import build
+from hybridreg.data.dataset import vouch
 from hybridreg.data.yaw_starts import YawStarts
-from hybridreg.eval.results import IDENTITY, Entry, Table
 from hybridreg.eval.run import store
 from hybridreg.eval.run.prediction import predict
 from hybridreg.eval.run.row import Row
 from hybridreg.eval.score import paper, scoring
+from hybridreg.eval.scored_table import IDENTITY, Entry, Table
 from hybridreg.eval.table_file import Recipe, slug
 from hybridreg.io import write_json
 from hybridreg.io.lock import folder_lock
@@ -85,7 +86,7 @@ def run(
     InUse
         Another process is writing into `out`.
     ValueError
-        No line can be run, or `out` holds predictions of another configuration.
+        No line can be run, `out` holds predictions of another configuration, or the poses map target to source.
     OSError
         `out` cannot be written to, or the disk is full; rows that are done are kept.
     """
@@ -93,6 +94,7 @@ def run(
         raise ValueError(
             f"none of {len(recipe.lines)} lines can be run; the first: {recipe.lines[0].problem}"
         )
+    vouch(pairs)
     folder = Path(out)
     (folder / "predictions").mkdir(parents=True, exist_ok=True)
     with folder_lock(folder):

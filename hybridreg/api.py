@@ -92,8 +92,9 @@ def register(
         Metres that the middle of the source may lie away from where `init` (or nothing) puts it; degrees that the pose
         may turn away from it. Poses beyond are neither found nor rivals.
     gravity : "known", "unknown", "up", (3,), or ((3,), (3,))
-        "unknown" where one cloud may be turned over; else a pose that turns the world upside down is never "ok". "up" where
-        z points up in both clouds; a vector where another axis does (one for both, or the source's and the target's).
+        "unknown" where one cloud may be turned over; else a pose that turns the world upside down is never "ok". "up"
+        where z points up in both clouds; a vector where another axis does (one for both, or the source's and the
+        target's).
     crop : float, six numbers, mapping, or None
         What of the clouds counts: a box of the target (lowest x, y, z, then highest), `{"source": box, "target": box}`,
         or a radius around where `init` puts the source. Rows in the result count the points that are left.

@@ -22,11 +22,10 @@ from hybridreg.pair import Pair
 from hybridreg.prior.prior import Prior
 from hybridreg.resolution import tolerance
 from hybridreg.result import RegistrationResult
-from hybridreg.returned import checked
 from hybridreg.runtime import optional_packages
 from hybridreg.runtime.resources import Clock, peak_memory_mb, reset_peak_memory
 from hybridreg.scene import Scene
-from hybridreg.slots import SLOTS
+from hybridreg.slots import SLOTS, checked
 from hybridreg.stage import Stage, own_params
 
 

@@ -21,7 +21,6 @@ ORDER = (
         "matches",
         "pair",
         "resolution",
-        "returned",
         "scene",
         "slots",
         "stage",

@@ -34,8 +34,10 @@ def before_after(path: str | os.PathLike[str], source: Array, target: Array, T: 
     frame = window(np.vstack(list(views.values())))
     figure = new_figure((10, 5.2))
     for axes, (title, points) in zip(figure.subplots(1, 2), views.items(), strict=True):
-        _draw(axes, points, still, frame)
+        draw_clouds(axes, points, still, frame)
         axes.set_title(f"{title}, from above")
+        axes.set_xlabel("x, m")
+        axes.legend(markerscale=8, loc="upper right")
     save(figure, path)
 
 
@@ -50,9 +52,13 @@ def new_figure(inches: tuple[float, float]) -> Figure:
 
 
 def save(figure: Figure, path: str | os.PathLike[str]) -> None:
-    """Write a figure as PNG, whole or not at all."""
+    """Write a figure as PNG, or as PDF where the name ends so, whole or not at all."""
+    pdf = os.fspath(path).lower().endswith(".pdf")
     with atomic_path(path) as temporary:
-        figure.savefig(temporary, format="png")
+        # Without the date two runs write the same bytes.
+        figure.savefig(
+            temporary, format="pdf" if pdf else "png", metadata={"CreationDate": None} if pdf else None
+        )
 
 
 def window(points: Array) -> tuple[Array, Array]:
@@ -63,12 +69,13 @@ def window(points: Array) -> tuple[Array, Array]:
     return middle - half, middle + half
 
 
-def _draw(axes: Any, source: Array, target: Array, window: tuple[Array, Array]) -> None:
-    axes.scatter(target[:, 0], target[:, 1], s=0.8, c=_TARGET, linewidths=0, label="target")
-    axes.scatter(source[:, 0], source[:, 1], s=0.8, c=_SOURCE, linewidths=0, label="source")
+def draw_clouds(axes: Any, source: Array, target: Array, window: tuple[Array, Array]) -> None:
+    """Both clouds from above, (N, 3) and (M, 3), within the window's corners."""
+    for points, colour, label in ((target, _TARGET, "target"), (source, _SOURCE, "source")):
+        # As pixels in a PDF too: tens of thousands of circles take a viewer minutes.
+        axes.scatter(points[:, 0], points[:, 1], s=0.8, c=colour, linewidths=0, label=label, rasterized=True)
     low, high = window
-    axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), xlabel="x, m", aspect="equal")
-    axes.legend(markerscale=8, loc="upper right")
+    axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
 
 
 def thin(points: Array) -> Array:

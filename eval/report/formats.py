@@ -10,11 +10,11 @@ from collections.abc import Sequence
 
 from hybridreg.eval.report import table_columns
 from hybridreg.eval.report.table_columns import Cells
-from hybridreg.eval.results import Table
 from hybridreg.eval.run.controls import MARK
 from hybridreg.eval.score import differences
 from hybridreg.eval.score.protocols import Protocol
 from hybridreg.eval.score.scoring import scene_of
+from hybridreg.eval.scored_table import Table
 from hybridreg.io.csv_cells import cell
 
 _LATEX = {"\\": r"\textbackslash{}", "°": r"$^\circ$", "–": "--"} | {c: f"\\{c}" for c in "&%$#_{}"}
@@ -91,8 +91,11 @@ def markdown_table(lines: Sequence[Cells]) -> str:
 
 
 def latex(table: Table, protocols: Sequence[Protocol]) -> str:
-    """The main table of every protocol, for the package booktabs."""
-    parts = [_latex_table(table.caption(each), tables(table, each)["Results"]) for each in protocols]
+    """The table of every protocol as papers print it, in four columns, for the package booktabs."""
+    parts = []
+    for each in protocols:
+        lines = [table_columns.printed(name, score) for name, score in table.scores(each).items()]
+        parts.append(_latex_table(f"{table.caption(each)}. Recall with its 95 % interval", lines))
     if table.paper is not None:
         parts.append(_latex_table(table.paper.heading(), table.paper.cells()))
     parts.extend(f"\\noindent {_escape(remark)}\n" for remark in table.remarks())

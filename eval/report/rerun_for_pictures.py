@@ -13,9 +13,10 @@ import numpy as np
 from hybridreg.config.plain_values import value_of
 from hybridreg.data.dataset import ids_of
 from hybridreg.eval.report import stage_pictures
-from hybridreg.eval.results import Entry, Table
 from hybridreg.eval.run.controls import Control
+from hybridreg.eval.run.truth import mask_threshold
 from hybridreg.eval.score.protocols import Protocol
+from hybridreg.eval.scored_table import Entry, Table
 from hybridreg.eval.table_file import slug
 from hybridreg.frames import lower_pose
 from hybridreg.pair import LabelledPair
@@ -45,7 +46,7 @@ def redraw(
     written = []
     ids = ids_of(pairs)
     for entry in table.methods:
-        control = _control(entry)
+        control = control_of(entry)
         if control is None:
             continue
         folder = Path(out) / slug(entry.name)
@@ -54,8 +55,15 @@ def redraw(
     return written
 
 
-def _control(entry: Entry) -> Control | None:
-    # A plain function left no word of how to make it again.
+def control_of(entry: Entry) -> Control | None:
+    """The pipeline that made a line, as a control; None for a plain function, which left no word of how to make it
+    again.
+
+    Raises
+    ------
+    MissingWeights, ValueError
+        It cannot be built again.
+    """
     spec: Mapping[str, Any] = entry.config.get("method", {})
     if not set(SLOTS) <= set(spec):
         return None
@@ -78,11 +86,12 @@ def _draw(
     if len(trace.matches):
         written.append(folder / f"{slug(pair.id)}-matches.png")
         stage_pictures.matches(written[-1], trace, truth, protocol.inlier_m)
-    if not _keeps_all(trace):
+    if not keeps_all(trace):
         written.append(folder / f"{slug(pair.id)}-mask.png")
-        stage_pictures.mask(written[-1], trace, truth)
+        stage_pictures.mask(written[-1], trace, truth, mask_threshold(pipeline.match))
     return written
 
 
-def _keeps_all(trace: Trace) -> bool:
+def keeps_all(trace: Trace) -> bool:
+    """Does the overlap stage leave nothing out?"""
     return bool(np.all(trace.overlap.source == 1.0) and np.all(trace.overlap.target == 1.0))

@@ -45,6 +45,19 @@ def results(name: str, score: Score) -> Cells:
     }
 
 
+def printed(name: str, score: Score) -> Cells:
+    """A method's line as papers print it: errors in the protocol's own averaging, recall with its interval, inliers."""
+    recall = percent(score.recall)
+    interval = f" [{percent(score.recall_low)}, {percent(score.recall_high)}]"
+    return {
+        "Method": name,
+        "RRE (°)": number(score.rre_deg, 2),
+        "RTE (m)": number(score.rte_m, 2),
+        "RR (%)": recall + interval,
+        "IR (%)": percent(score.inlier_ratio),
+    }
+
+
 def thresholds(name: str, score: Score) -> Cells:
     """Recall at the fixed thresholds."""
     return {"method": name, **{f"recall % {at}": percent(r) for at, r in score.recall_at.items()}}

@@ -12,12 +12,12 @@ import numpy as np
 from hybridreg.data.dataset import ids_of
 from hybridreg.eval.report import formats, page, plotly_figures
 from hybridreg.eval.report.table_columns import Cells, number
-from hybridreg.eval.results import Entry, Table
 from hybridreg.eval.run.attempt import one_line
 from hybridreg.eval.run.row import Row
 from hybridreg.eval.score import errors
 from hybridreg.eval.score.protocols import Protocol
 from hybridreg.eval.score.scoring import identity
+from hybridreg.eval.scored_table import Entry, Table
 from hybridreg.io import write_text
 from hybridreg.pair import LabelledPair
 from hybridreg.runtime import optional_packages

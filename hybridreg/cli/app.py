@@ -8,7 +8,19 @@ from typing import Annotated
 import typer
 
 import hybridreg
-from hybridreg.cli import datasets, demo, doctor, evaluate, listing, register, report, simulate, table, train
+from hybridreg.cli import (
+    datasets,
+    demo,
+    doctor,
+    evaluate,
+    figure,
+    listing,
+    register,
+    report,
+    simulate,
+    table,
+    train,
+)
 
 app = typer.Typer(
     name="hybridreg",
@@ -38,6 +50,7 @@ app.command("register")(register.command)
 app.command("eval")(evaluate.command)
 app.command("table")(table.command)
 app.command("report")(report.command)
+app.command("figure")(figure.command)
 app.command("train")(train.command)
 app.command("simulate")(simulate.command)
 app.command("list")(listing.command)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""`hybridreg datasets`: looking at data sets before they are used."""
+"""`hybridreg datasets`: which there are, and looking at them before they are used."""
 
 from __future__ import annotations
 
@@ -16,11 +16,20 @@ from hybridreg.cli.stop_signals import going_on
 if TYPE_CHECKING:
     from hybridreg.data.summary import Array, Summary
 
-app = typer.Typer(help="Look at a data set, or make what it lacks.", no_args_is_help=True)
+app = typer.Typer(help="List the data sets, look at one, or make what it lacks.", invoke_without_command=True)
 
 # Errors of the identity that the Cross3DReg paper's table gives for its test split.
 _PAPER = "Cross3DReg's paper: 94.7 deg, 9.3 m"
 _BAR = 40
+
+
+@app.callback()
+@plainly
+def overview(context: typer.Context) -> None:
+    """List every data set: what it is, its licence, size, where to get it, and a command to check it."""
+    if context.invoked_subcommand is None:
+        for line in listed():
+            print(line)
 
 
 @app.command("inspect")
@@ -52,6 +61,21 @@ def kitti_list(
 
     with going_on(lambda: "nothing is written before the last pair: the same command begins anew"):
         print(f"written to {listing.write(root, split, workers)}")
+
+
+def listed() -> Iterator[str]:
+    """Every loader's facts as text, line by line; plug-ins by their name alone."""
+    from hybridreg.data import catalogue
+    from hybridreg.data.dataset_facts import FACTS
+
+    for name in catalogue.names():
+        facts = FACTS.get(name)
+        if facts is None:
+            yield f"{name}: of a plug-in"
+            continue
+        yield f"{name}: {facts.what}"
+        told = {"licence": facts.licence, "size": facts.size, "from": facts.place, "check": facts.check}
+        yield from (f"  {key + ':':<9}{value}" for key, value in told.items())
 
 
 def lines(found: Summary) -> Iterator[str]:

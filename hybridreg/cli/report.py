@@ -13,8 +13,8 @@ from hybridreg.cli import options
 from hybridreg.cli.error_messages import plainly
 
 if TYPE_CHECKING:
-    from hybridreg.eval.results import Table
     from hybridreg.eval.score.protocols import Protocol
+    from hybridreg.eval.scored_table import Table
     from hybridreg.pair import LabelledPair
 
 

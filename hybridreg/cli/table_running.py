@@ -14,8 +14,8 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from hybridreg.eval.report.table_columns import Cells
-    from hybridreg.eval.results import Table
     from hybridreg.eval.score.protocols import Protocol
+    from hybridreg.eval.scored_table import Table
     from hybridreg.eval.table_file import Recipe
     from hybridreg.pair import LabelledPair
 
@@ -47,6 +47,8 @@ def run(recipe: Recipe, data: str, out: Path, *, workers: int, overwrite: bool) 
             on_row=lambda name, _: progress.advance(bars[name]),
         )
     write(done, recipe.protocols, out, with_starts(pairs, recipe.starts, recipe.seed))
+    if failure := done.failure():
+        raise ValueError(failure)
 
 
 def with_starts(pairs: Sequence[LabelledPair], starts: int, seed: int) -> Sequence[LabelledPair]:
@@ -91,5 +93,7 @@ def print_table(caption: str, lines: Sequence[Cells]) -> None:
         grid.add_column(Text(shown(key)), justify="left" if key == "method" else "right", no_wrap=True)
     for line in lines:
         grid.add_row(*(Text(shown(cell)) for cell in line.values()))
-    console = Console(width=None if sys.stdout.isatty() else 240)
+    wide = Console(width=10_000)
+    fitting = max(240, wide.measure(grid).maximum)
+    console = Console(width=None if sys.stdout.isatty() else fitting)
     console.print(grid)

@@ -22,9 +22,11 @@ BUILT_IN = {
     "3dmatch": "hybridreg.data.loaders.threedmatch:ThreeDMatch.from_text",
     "cross-lidar": "hybridreg.data.loaders.cross_lidar:CrossLidar.from_text",
     "cross3dreg": "hybridreg.data.loaders.cross3dreg:Cross3DReg.from_text",
+    "dair-v2x": "hybridreg.data.loaders.dair_v2x:DairV2x.from_text",
     "folder": "hybridreg.data.loaders.folder:PairFolder",
     "helipr": "hybridreg.data.loaders.helipr:HeLiPr.from_text",
     "kitti": "hybridreg.data.loaders.kitti:Kitti.from_text",
+    "pandaset": "hybridreg.data.loaders.pandaset:PandaSet.from_text",
     "sim": "hybridreg.data.loaders.simulated:Simulated",
     "tiers": "hybridreg.data.loaders.tiers:Tiers.from_text",
 }

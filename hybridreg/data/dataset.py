@@ -75,6 +75,26 @@ def ids_of(pairs: Sequence[LabelledPair]) -> tuple[str, ...]:
     return ids
 
 
+def vouch(pairs: Sequence[LabelledPair]) -> None:
+    """Look at the poses' direction before any pair is handed out, where the sequence can.
+
+    Raises
+    ------
+    WrongDirection
+        They map target to source; a ValueError that says how to open the data set then.
+    """
+    from hybridreg.data.lists.direction import WrongDirection
+
+    own = getattr(pairs, "vouch", None)
+    if callable(own):
+        try:
+            own()
+        except WrongDirection:
+            raise
+        except (OSError, ValueError):
+            return  # a pair that cannot be read is told where it is read
+
+
 def fingerprint_of(pairs: Sequence[LabelledPair]) -> str:
     """Fingerprint of any sequence: its own where it has one, else that of the names."""
     own = getattr(pairs, "fingerprint", None)

@@ -18,6 +18,9 @@ _MARKS: tuple[tuple[str, tuple[str, ...]], ...] = (
     ("3dcsr", ("kinect_lidar",)),
     ("3dcsr", ("kinect_sfm",)),
     ("tiers", ("tiers_*/*/scans",)),
+    ("pandaset", ("*/lidar/poses.json", "*/lidar/*.pkl.gz")),
+    ("dair-v2x", ("cooperative/data_info.json", "infrastructure-side", "vehicle-side")),
+    ("dair-v2x", ("cooperative-vehicle-infrastructure/cooperative/data_info.json",)),
     ("helipr", ("Avia/velodyne", "Ouster/velodyne")),
     ("cross-lidar", ("source", "target")),
 )

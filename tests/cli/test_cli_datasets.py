@@ -31,6 +31,32 @@ def archive(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return loader_trees.cross3dreg(tmp_path_factory.mktemp("archive")).root
 
 
+def test_every_data_set_is_listed_with_licence_size_place_and_a_check(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    from hybridreg.data import catalogue
+    from hybridreg.data.dataset_facts import FACTS
+
+    assert set(FACTS) == set(catalogue.BUILT_IN)
+    code, out, _ = run(capsys, "datasets")
+    assert code == 0
+    for name, facts in FACTS.items():
+        assert f"{name}: {facts.what}" in out
+        for text in (facts.licence, facts.size, facts.place, facts.check):
+            assert text
+            assert text in out
+        # The command that checks it is one that opens by that loader's own name.
+        assert facts.opened == "FOLDER" or facts.opened.startswith(f"{name}:")
+    assert "pandaset: forward solid-state" in out
+    assert "  licence: CC BY 4.0" in out
+
+
+def test_the_simulators_check_runs(capsys: pytest.CaptureFixture[str]) -> None:
+    code, out, _ = run(capsys, "datasets", "inspect", "sim:test/near#1")
+    assert code == 0
+    assert "pairs: 1, of which 1 were read" in out
+
+
 def test_inspect_tells_everything(archive: Path, capsys: pytest.CaptureFixture[str]) -> None:
     code, out, err = run(capsys, "datasets", "inspect", str(archive))
     assert (code, err) == (0, "")

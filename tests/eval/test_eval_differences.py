@@ -7,8 +7,8 @@ from eval_stubs import row
 
 from hybridreg.eval import PROTOCOLS
 from hybridreg.eval.report import formats
-from hybridreg.eval.results import Entry, Table
 from hybridreg.eval.score.differences import cells, difference
+from hybridreg.eval.scored_table import Entry, Table
 
 KITTI = PROTOCOLS["kitti"]
 

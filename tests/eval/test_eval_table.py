@@ -16,8 +16,8 @@ from eval_stubs import Moody, RowByRow, Scattered, row
 
 from hybridreg.eval import PROTOCOLS, read, table_run
 from hybridreg.eval.report import formats, plotly_figures, table_report
-from hybridreg.eval.results import Entry, Table
 from hybridreg.eval.run.row import Row
+from hybridreg.eval.scored_table import Entry, Table
 from hybridreg.eval.table_file import Line, Recipe
 
 CROSS, KITTI, PREDATOR = (PROTOCOLS[name] for name in ("cross3dreg", "kitti", "predator"))
@@ -147,6 +147,9 @@ def test_latex_is_escaped_and_balanced(ran: tuple[Table, Path]) -> None:
     text = formats.latex(ran[0], RECIPE.protocols)
     assert text.count(r"\begin{table}") == text.count(r"\end{table}") == 2
     assert r"Stubs \& friends" in text
+    # As papers print it: the method and four columns.
+    assert text.count(r"Method & RRE ($^\circ$) & RTE (m) & RR (\%) & IR (\%) \\") == 2
+    assert text.count(r"\begin{tabular}{lrrrr}") == 2
     assert r"moody\_$<$b$>$" in text
     assert not re.search(r"(?<!\\)[%#]", text)
     body = [line for line in text.splitlines() if line.endswith(r"\\")]

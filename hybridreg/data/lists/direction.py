@@ -25,6 +25,10 @@ _SOURCE, _TARGET = 4_000, 60_000
 _HARDLY = 0.02
 
 
+class WrongDirection(ValueError):
+    """The poses of a data set seem to map target to source."""
+
+
 class Readable(Protocol):
     """Pairs that can be read without the check that is made here."""
 
@@ -79,7 +83,7 @@ def check(pairs: Readable, name: str, cure: str) -> None:
 
     Raises
     ------
-    ValueError
+    WrongDirection
         The inverses fit better; `cure` is what to do then.
 
     Warns
@@ -89,7 +93,7 @@ def check(pairs: Readable, name: str, cure: str) -> None:
     """
     found = measured(pairs)
     if found.is_inverted:
-        raise ValueError(f"{name}: {found}; the poses seem to map target to source, {cure}")
+        raise WrongDirection(f"{name}: {found}; the poses seem to map target to source, {cure}")
     if found.as_given < _HARDLY:
         warnings.warn(
             f"{name}: {found}; the clouds hardly meet, are the poses theirs?", UserWarning, stacklevel=3

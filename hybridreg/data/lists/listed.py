@@ -80,10 +80,14 @@ class ListedPairs(Dataset):
         return self.entries[index].read()
 
     def load(self, index: int) -> LabelledPair:
+        self.vouch()
+        return self.read(index)
+
+    def vouch(self) -> None:
+        """`check`, once a process, where nobody has vouched for the poses' direction."""
         if self.if_inverted and (key := (str(self.origin), self.entries.digest())) not in _CHECKED:
             self.check()
             _CHECKED.add(key)
-        return self.read(index)
 
     def check(self) -> None:
         """Refuse poses of the wrong direction; runs before the first pair is handed out."""

@@ -45,7 +45,11 @@ def read_records(path: Path) -> list[Record]:
         content = _rows(content, name)
     if not isinstance(content, (list, tuple)) or not all(isinstance(each, Mapping) for each in content):
         kind = type(content).__name__
-        raise fault(name, f"holds a {kind} that is no list of dictionaries", "give the data set's own list")
+        raise fault(
+            name,
+            f"holds a {kind} that is no list of dictionaries",
+            "give the data set's own list, or name its columns: seq_id, frame0, frame1, transform, pcd0, pcd1",
+        )
     if len(content) == 0:
         raise fault(name, "lists 0 pairs")
     return list(content)
@@ -109,6 +113,26 @@ def number(record: Record, aliases: Sequence[str], label: str) -> int:
     return int(digits)
 
 
+def sequence(record: Record, label: str) -> str:
+    """The name of a sequence's folder: two digits where it is a number, as KITTI writes them, else its own name.
+
+    Raises
+    ------
+    ValueError
+        The field is not there, or is no name of a folder.
+    """
+    value = need(record, SEQUENCE, label)
+    text = str(value.item() if isinstance(value, np.generic) else value).replace("\\", "/").strip("/")
+    name = text.rpartition("/")[2]
+    if isinstance(value, (float, np.floating)) or (
+        name.rpartition("_")[2].isdecimal() and name.startswith("seq")
+    ):
+        return f"{number(record, SEQUENCE, label):02d}"
+    if not name or name in (".", ".."):
+        raise fault(label, f"has {shorten(value)} where a sequence's name should be", "name its folder")
+    return f"{int(name):02d}" if name.isdecimal() and len(name) <= 18 else name
+
+
 def overlap(record: Record, label: str) -> float | None:
     """The overlap that the list tells, or None.
 
@@ -126,7 +150,7 @@ def overlap(record: Record, label: str) -> float | None:
 
 
 def transform_of(record: Record, label: str) -> Array:
-    """The pose (4, 4) of a record, from one matrix or from rotation and translation.
+    """The pose (4, 4) of a record: one matrix (4x4, 3x4, or its 16 or 12 numbers), or rotation and translation.
 
     Raises
     ------
@@ -135,12 +159,20 @@ def transform_of(record: Record, label: str) -> Array:
     """
     whole = find(record, TRANSFORM)
     if whole is not None:
-        return rigid(_numbers(whole, label), f"{label}: transform")
+        return rigid(_whole(_numbers(whole, label)), f"{label}: transform")
     R = _numbers(need(record, TRANSFORM + ROTATION, label), label)
+    R = R.reshape(3, 3) if R.size == 9 else R
     t = _numbers(need(record, TRANSLATION, label), label).reshape(-1)
     if R.shape != (3, 3) or t.shape != (3,):
         raise fault(label, f"its rotation has the shape {R.shape}, its translation {t.shape}")
     return rigid(se3.from_rt(R, t), f"{label}: rotation")
+
+
+def _whole(numbers: Array) -> Array:
+    # Some write the upper three rows, some either of them as one line; leading axes of length one say nothing.
+    if numbers.size == 12:
+        return np.vstack([numbers.reshape(3, 4), [0.0, 0.0, 0.0, 1.0]])
+    return numbers.reshape(4, 4) if numbers.size == 16 else numbers
 
 
 def _numbers(value: Any, label: str) -> Array:

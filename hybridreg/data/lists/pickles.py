@@ -38,7 +38,7 @@ def load(stream: io.BytesIO, name: str) -> Any:
     with foreign_parser(name, "a pickle"):
         try:
             return PlainUnpickler(stream).load()
-        except _Forbidden as error:
+        except Forbidden as error:
             refused = error.name
     cure = "take the file from where the data set's authors publish it; nothing of it was run"
     raise fault(name, f"asks for {refused}, which a table of numpy arrays has no use for", cure)
@@ -58,7 +58,9 @@ def globals_of(data: bytes) -> set[str]:
     return found
 
 
-class _Forbidden(Exception):
+class Forbidden(Exception):
+    """A pickle asks for what no table has a use for."""
+
     def __init__(self, name: str) -> None:
         super().__init__(name)
         self.name = name
@@ -77,12 +79,12 @@ class PlainUnpickler(pickle.Unpickler):
     def find_class(self, module: str, name: str) -> Any:
         full = f"{module}.{name}".replace("numpy._core", "numpy.core")
         if full not in _STAND_INS:
-            raise _Forbidden(f"{module}.{name}")
+            raise Forbidden(f"{module}.{name}")
         # A fresh wrapper, as a pickle may also set attributes of what it was given.
         return partial(_STAND_INS[full])
 
     def persistent_load(self, pid: Any) -> Any:
-        raise _Forbidden("an object kept outside the pickle (a torch tensor's storage?)")
+        raise Forbidden("an object kept outside the pickle (a torch tensor's storage?)")
 
 
 def _empty_array(*_: Any) -> NDArray[Any]:
@@ -110,6 +112,24 @@ def _no_bytes() -> bytes:
     return b""  # how Python 2's protocols spell an empty array's content
 
 
+def _storage(data: bytes) -> NDArray[Any]:
+    # What PyTorch writes for the numbers of a tensor is an archive of its own; its reader for weights runs nothing.
+    import torch
+
+    held = torch.load(io.BytesIO(data), weights_only=True)
+    return np.asarray(torch.tensor([], dtype=held.dtype).set_(held))
+
+
+def _tensor(
+    storage: NDArray[Any], offset: int, size: tuple[int, ...], stride: tuple[int, ...], *_: Any
+) -> Any:
+    steps = sum((n - 1) * step for n, step in zip(size, stride, strict=True)) if all(size) else -1
+    if min((offset, *size, *stride)) < 0 or offset + steps >= len(storage):
+        raise ValueError("a tensor reaches beyond its numbers")
+    flat = storage[offset:]
+    return np.lib.stride_tricks.as_strided(flat, size, [step * flat.itemsize for step in stride]).copy()
+
+
 _STAND_INS: dict[str, Any] = {
     "numpy.core.multiarray._reconstruct": _empty_array,
     "numpy.core.multiarray.scalar": _number,
@@ -119,4 +139,7 @@ _STAND_INS: dict[str, Any] = {
     "_codecs.encode": _latin1,
     "__builtin__.bytes": _no_bytes,
     "builtins.bytes": _no_bytes,
+    "torch.storage._load_from_bytes": _storage,
+    "torch._utils._rebuild_tensor_v2": _tensor,
+    "collections.OrderedDict": dict,
 }

@@ -5,23 +5,19 @@ from __future__ import annotations
 
 import os
 import warnings
-from dataclasses import dataclass, field
-from pathlib import Path, PurePosixPath
+from pathlib import Path
 
 from hybridreg.data.lists import azimuth, pair_records, required_files
 from hybridreg.data.lists.listed import ListedPairs
-from hybridreg.data.lists.pair_files import PairFiles, read_scan
-from hybridreg.geometry import se3
-from hybridreg.io.faults import fault
-
-_SENSORS = ("lidar", "array")  # the archive does not say which of the two spins
+from hybridreg.data.lists.sequence_archive import SequenceArchive
 
 
 class Cross3DReg(ListedPairs):
     """The paper's own data set; its limits are 2 deg and 0.5 m.
 
     Nothing but the archive's folders is known for certain: fields go by aliases (`hybridreg.data.lists.pair_records`),
-    the sensors' roles by geometry, and the first pair asked for has the direction of 20 poses checked.
+    the sensors' roles by geometry, and the first pair asked for has the direction of 20 poses checked. Poses may
+    be 4x4, 3x4 or lines of numbers, lists, arrays or tensors; clouds may be told by path, by file name, or by frame.
 
     Parameters
     ----------
@@ -31,6 +27,8 @@ class Cross3DReg(ListedPairs):
         "train", "val" or "test".
     inverted : bool
         The list's poses map target to source.
+    swap : bool
+        The list's cloud 0 is to be the source, and its cloud 1 the target.
 
     Raises
     ------
@@ -40,15 +38,21 @@ class Cross3DReg(ListedPairs):
         The list is empty, damaged, or asks for classes that a list of pairs has no use for.
     """
 
-    def __init__(self, root: str | os.PathLike[str], split: str = "test", inverted: bool = False) -> None:
+    def __init__(
+        self,
+        root: str | os.PathLike[str],
+        split: str = "test",
+        inverted: bool = False,
+        swap: bool = False,
+    ) -> None:
         base = required_files.folder(Path(root), "Cross3DReg")
         base = base / "Cross3DReg" if (base / "Cross3DReg").is_dir() else base
         table = required_files.first(
             [base / "metadata" / f"{split}.pkl"], f"Cross3DReg's list of the pairs of {split}"
         )
         rows = pair_records.read_records(table)
-        archive = _Archive(base)
-        entries = [archive.entry(row, f"{table}, pair {n}", inverted) for n, row in enumerate(rows)]
+        archive = SequenceArchive(base, inverted=inverted, swap=swap)
+        entries = [archive.entry(row, f"{table}, pair {n}") for n, row in enumerate(rows)]
         undo = "no" if inverted else "yes"
         cure = f"open the data set with inverted={undo}"
         super().__init__(entries, table, if_inverted=cure, fields=tuple(map(str, rows[0])))
@@ -60,79 +64,7 @@ class Cross3DReg(ListedPairs):
         if (source, target) == ("spinning", "limited"):
             warnings.warn(
                 f"{self.origin}: the list's source spins and its target is a fan, the paper's are the "
-                "other way round; the pairs are used as listed",
+                "other way round; the pairs are used as listed, unless the data set is opened with swap=yes",
                 UserWarning,
                 stacklevel=2,
             )
-
-
-@dataclass
-class _Archive:
-    base: Path
-    shelf: required_files.Shelf = field(default_factory=required_files.Shelf)
-    _fan: str = ""
-
-    def entry(self, row: pair_records.Record, label: str, inverted: bool) -> PairFiles:
-        sequence = pair_records.number(row, pair_records.SEQUENCE, label)
-        source, target = (
-            self._cloud(row, side, sequence, label)
-            for side in (
-                (pair_records.SOURCE, pair_records.SOURCE_FRAME),
-                (pair_records.TARGET, pair_records.TARGET_FRAME),
-            )
-        )
-        T = pair_records.transform_of(row, label)
-        return PairFiles(
-            id=f"{sequence:02d}/{source.stem}-{target.stem}",
-            source=source,
-            target=target,
-            image=self._image(row, sequence, (source.stem, target.stem)),
-            T_target_source=se3.inverse(T) if inverted else T,
-            overlap=pair_records.overlap(row, label),
-            source_sensor=source.parent.name,
-            target_sensor=target.parent.name,
-        )
-
-    def _cloud(
-        self,
-        row: pair_records.Record,
-        side: tuple[tuple[str, ...], tuple[str, ...]],
-        sequence: int,
-        label: str,
-    ) -> Path:
-        listed, frames = side
-        named = pair_records.find(row, listed)
-        if named is not None:
-            return self._place(str(named), required_files.CLOUDS)
-        frame = pair_records.number(row, frames, label)
-        fan = self._fan = self._fan or self._which_is_the_fan(sequence, frame, label)
-        spinning = next(name for name in _SENSORS if name != fan)
-        folder = fan if listed == pair_records.SOURCE else spinning
-        return self._place(f"sequences/{sequence:02d}/{folder}/{frame:06d}.ply", required_files.CLOUDS)
-
-    def _image(self, row: pair_records.Record, sequence: int, frames: tuple[str, str]) -> Path | None:
-        named = pair_records.find(row, pair_records.IMAGE)
-        if isinstance(named, str):
-            return self._place(named, required_files.IMAGES)
-        folder = self.base / "sequences" / f"{sequence:02d}" / "image"
-        found = (self.shelf.variant(folder / f"{frame}.jpg", required_files.IMAGES) for frame in frames)
-        return next(filter(None, found), None)
-
-    def _place(self, named: str, suffixes: tuple[str, ...]) -> Path:
-        # Lists made on the authors' machine may hold their paths: what counts begins at "sequences".
-        parts = PurePosixPath(named.replace("\\", "/")).parts
-        if "sequences" in parts:
-            parts = parts[parts.index("sequences") :]
-        path = self.base.joinpath(*parts)
-        return self.shelf.variant(path, suffixes) or path
-
-    def _which_is_the_fan(self, sequence: int, frame: int, label: str) -> str:
-        folder = self.base / "sequences" / f"{sequence:02d}"
-        for name in _SENSORS:
-            file = self._place(f"sequences/{folder.name}/{name}/{frame:06d}.ply", required_files.CLOUDS)
-            if azimuth.coverage(read_scan(file, name).points).role == "limited":
-                return name
-        cure = "name the clouds of each pair in the fields pcd0 (target) and pcd1 (source)"
-        raise fault(
-            label, f"names no clouds, and neither {' nor '.join(_SENSORS)} of {folder} is a fan", cure
-        )

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hybridreg.data import content, open_dataset
-from hybridreg.data.dataset import ids_of, pair_fingerprints_of
+from hybridreg.data.dataset import ids_of, pair_fingerprints_of, vouch
 from hybridreg.learned.training.data.tensor_cache import NotKept, TensorCache
 from hybridreg.pair import LabelledPair
 
@@ -116,6 +116,7 @@ def opened(
         The data cannot be opened, or has no pairs.
     """
     pairs = open_dataset(source.data)
+    vouch(pairs)
     n = min(len(pairs), source.pairs) if source.pairs else len(pairs)
     if n == 0:
         raise ValueError(f"{source.title}: a data set of 0 pairs; training needs one at least")

@@ -56,6 +56,14 @@ class Table:
             *self._own_grids(),
         ]
 
+    def failure(self) -> str:
+        """Why every row of every method failed, by the first; empty where one did not."""
+        rows = [(entry.name, row) for entry in self.methods for row in entry.rows]
+        if not rows or any(row.error is None for _, row in rows):
+            return ""
+        name, first = rows[0]
+        return f"all {len(rows)} rows failed; the first, {first.id} by {name}: {first.error}"
+
     def _own_grids(self) -> list[str]:
         # What a downsampling stage chose does not reach a network that has a grid of its own.
         names = [
