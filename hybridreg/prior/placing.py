@@ -60,7 +60,8 @@ def within_box(cloud: PointCloud, low: Array, high: Array, name: str) -> PointCl
     """
     low, high = low - cloud.offset, high - cloud.offset
     words = f"crop: the box of {_corner(low + cloud.offset)} to {_corner(high + cloud.offset)}"
-    return _kept(cloud, ((cloud.points >= low) & (cloud.points <= high)).all(axis=1), name, words)
+    inside = np.all((cloud.points >= low) & (cloud.points <= high), axis=1)
+    return _kept(cloud, np.asarray(inside), name, words)
 
 
 def within_radius(cloud: PointCloud, middle: Array, radius: float, name: str) -> PointCloud:

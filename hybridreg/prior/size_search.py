@@ -9,15 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybridreg import spec
-from hybridreg.evidence.scale import size
-from hybridreg.evidence.surface_distance import closeness
+from hybridreg.evidence import views
+from hybridreg.evidence.pose_evidence import PoseEvidence
 from hybridreg.geometry import se3
 from hybridreg.matches import Correspondences, Pose
 from hybridreg.pair import Pair
 from hybridreg.prior.placing import sized
 from hybridreg.resolution import comparable, size_ratio
 from hybridreg.scene import Scene
-from hybridreg.search.rivals import seen_at
+from hybridreg.search.hypothesis import seen_at
 from hybridreg.verdict import weigh
 
 Array = NDArray[np.float64]
@@ -85,7 +85,7 @@ def _searched(pair: Pair, scale: float) -> _Tried | None:
     pose = search(scene, Correspondences.none(), np.random.default_rng(0))
     if not pose.found:
         return None
-    return _Tried(scale, seen_at(scene, [pose.T], 1)[0].support, pose.T)
+    return _Tried(scale, seen_at(scene, [pose.T], 1)[0].log_odds, pose.T)
 
 
 def _refined(scene: Scene, T: Array) -> Array:
@@ -105,7 +105,7 @@ def _at_its_best(pair: Pair, tried: _Tried) -> _Tried:
     for _ in range(_ROUNDS):
         scene = _scene(pair, scale)
         T = _refined(scene, T)
-        factor = size(scene, T).scale
+        factor = PoseEvidence(views.of(scene), T).size.scale
         if factor == 1.0:
             break
         scale, T = scale * factor, _resized(scene, T, factor)
@@ -116,7 +116,7 @@ def _closest(pair: Pair, start: _Tried) -> Size:
     def at(scale: float, T: Array) -> _Tried:
         scene = _scene(pair, scale)
         T = _refined(scene, T)
-        return _Tried(scale, closeness(scene, T), T)
+        return _Tried(scale, PoseEvidence(views.of(scene), T).closeness, T)
 
     def beside(one: _Tried, factor: float) -> _Tried:
         return at(one.scale * factor, _resized(_scene(pair, one.scale), one.T, factor))
