@@ -122,7 +122,7 @@ class Pose:
         Other poses that the data nearly supports, best first.
     found : bool
         False where the stage had nothing to work with and T is only a placeholder (the identity).
-    recipes : int
+    found_by : int
         Methods that came to T independently of one another.
     hypotheses : tuple
         What the estimator knows about T and each of the rivals (`hybridreg.search.hypothesis.Hypothesis`), in that
@@ -137,7 +137,7 @@ class Pose:
     inliers: NDArray[np.bool_] | None = None
     rivals: Array = field(default_factory=lambda: np.zeros((0, 4, 4)))
     found: bool = True
-    recipes: int = 1
+    found_by: int = 1
     hypotheses: tuple[Any, ...] = ()
     weighed: Any = None
     entries: tuple[EntryTrace, ...] = ()

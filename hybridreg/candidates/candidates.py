@@ -56,25 +56,24 @@ _WEAK = 0.01
 
 @dataclass(frozen=True, kw_only=True)
 class Candidates(Stage):
-    """Try recipes in turn and return the pose that both clouds support best.
+    """Try several entries in turn and return the likeliest pose.
 
-    Every pose that an entry offers is settled and ranked by its log-odds (`hybridreg.evidence.log_odds`),
-    the best ones are refined, and the best of these is weighed with the others as its rivals. A pose to which
-    several entries came is believed the more; one that surfaces hardly hold is moved to where it has more support.
-    Later entries are not run once the confidence is `enough`; when none brings it, all that was tried is looked at a
-    second time, and better supported poses are looked for around the best ones. What was not chosen comes back as
-    `rivals`.
+    Every pose that an entry offers is settled and ranked by its log-odds (`hybridreg.evidence.log_odds`), the best are
+    refined, and the best of these is weighed with the others as its rivals. A pose that several entries found is more
+    credible; one that the surfaces hardly constrain is moved to where it is likelier. Later entries are not run once
+    the confidence is `enough`. Where none brings it, all starts are examined a second time, and likelier poses are
+    looked for around the best. What was not chosen is returned as `rivals`, what each entry did as `entries`.
 
     Parameters
     ----------
     of : tuple of mappings
-        Recipes: each holds an estimate stage, perhaps a match stage, and perhaps an overlap stage for that. An entry
+        The entries: each holds an estimate stage, perhaps a match stage, and perhaps an overlap stage for that. One
         without `match` gets the matches that this stage was given. One that raises ValueError, ImportError or OSError,
         or lacks its image, is left out with a note; where every one lacks a package or its weights, that is an
         ImportError.
     refine : stage of the refine slot
-        For the best poses of an entry. The pose returned needs no other refinement, unless nothing speaks for it: no
-        refinement is tried then, as nothing would let it rest.
+        For the best poses of an entry. The pose returned needs no further refinement, unless it is hopeless: then none
+        is tried, as it would converge to nothing.
     enough : float in [0, 1]
         Confidence at which the search stops (the verdict's "ok"); 1 tries every entry.
     """
@@ -89,7 +88,7 @@ class Candidates(Stage):
         if any(isinstance(stage, (str, Mapping)) for entry in self.of for stage in entry.values()):
             object.__setattr__(self, "of", tuple(_built(entry) for entry in self.of))
         if not self.of:
-            raise ValueError("of: no recipe at all; give one at least, such as {'estimate': 'birdseye'}")
+            raise ValueError("of: no entry at all; give one at least, such as {'estimate': 'birdseye'}")
         for entry in self.of:
             _check(entry)
         if not 0.0 <= self.enough <= 1.0:
@@ -158,7 +157,7 @@ class Candidates(Stage):
                 offered.append(here)
                 found = _polished(scene, counted(scene, self._joined(scene, found, here), offered))
             if len(missing) == len(self.of):
-                raise ImportError(f"none of its {len(missing)} recipes can be run here: {missing[0]}")
+                raise ImportError(f"none of its {len(missing)} entries can be run here: {missing[0]}")
             traces.append(_traced(name, start, here, problem))
             yield found
         if not found or found[0].log_odds < HOPELESS:
@@ -283,5 +282,5 @@ def _overlap(entry: Entry, scene: Scene) -> Overlap:
 
 
 def _left_out(entry: Entry, scene: Scene, error: Exception) -> str:
-    scene.note(f"a candidate ({' + '.join(type(s).__name__ for s in entry.values())}) was left out: {error}")
+    scene.note(f"an entry ({' + '.join(type(s).__name__ for s in entry.values())}) was left out: {error}")
     return str(error)

@@ -40,7 +40,7 @@ class Evidence:
     relief_cells: float  # cells of ground that both clouds show
     relief_correlation: float  # of their heights, between -1 and 1
     weakest: float  # smallest eigenvalue of the information per point, at most 1/3
-    recipes: float  # entries that found the pose independently of one another
+    found_by: float  # entries that found the pose independently of one another
     matched: float  # largest agreeing share of any matcher's matches; 0 where none ran
     closeness: float  # nats per point by which a rival's points lie closer to the surfaces; at most 0
     overturned: float  # 1 where the pose turns the world upside down or puts a sensor underground, else 0
@@ -65,7 +65,7 @@ class Evidence:
         cls,
         agreement: Agreement,
         held: Information,
-        recipes: int = 1,
+        found_by: int = 1,
         matched: float = 0.0,
         closeness: float = 0.0,
     ) -> Evidence:
@@ -87,7 +87,7 @@ class Evidence:
             relief_cells=float(agreement.relief.cells),
             relief_correlation=float(agreement.relief.correlation),
             weakest=held.weakest,
-            recipes=float(recipes),
+            found_by=float(found_by),
             matched=float(matched),
             closeness=float(closeness),
             overturned=float(agreement.overturned),

@@ -30,7 +30,7 @@ class Hypothesis:
         Log-odds that it is right by the surfaces alone, perhaps from some of the sampled points.
     settled : bool
         It rests where the surfaces let it, and need not be settled again.
-    recipes : int
+    found_by : int
         Entries that found it independently of one another.
     matched : float
         Share of matches that agree with it.
@@ -45,7 +45,7 @@ class Hypothesis:
     at: PoseEvidence
     by_surfaces: float
     settled: bool = False
-    recipes: int = 1
+    found_by: int = 1
     matched: float = 0.0
     closeness: float = 0.0
     came_from: str = ""
@@ -93,7 +93,7 @@ class Found:
 def as_pose(found: Sequence[Hypothesis]) -> Pose:
     """The first of `found`, at least one, as a pose with the others as its rivals."""
     pose = Pose.ranked([one.T for one in found])
-    return replace(pose, recipes=found[0].recipes, hypotheses=tuple(found))
+    return replace(pose, found_by=found[0].found_by, hypotheses=tuple(found))
 
 
 def of_pose(scene: Scene, pose: Pose) -> PoseEvidence:

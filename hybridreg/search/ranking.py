@@ -56,7 +56,7 @@ def counted(
         came = [
             any(not differs(other.T, one.T, centre, both.spacing) for other in entry) for entry in offered
         ]
-        return one.but(recipes=max(sum(came), 1), matched=match_agreement.share(scene, one.T), closeness=0.0)
+        return one.but(found_by=max(sum(came), 1), matched=match_agreement.share(scene, one.T), closeness=0.0)
 
     return best(told_apart([told(one) for one in found]))
 

@@ -36,7 +36,7 @@ def find(scene: Scene, own: PoseEvidence, pose: Pose) -> list[Hypothesis]:
         return differs(T, own.T, centre, views.spacing)
 
     def with_matches(one: Hypothesis) -> Hypothesis:
-        return one.but(matched=match_agreement.share(scene, one.T), closeness=0.0, recipes=1)
+        return one.but(matched=match_agreement.share(scene, one.T), closeness=0.0, found_by=1)
 
     known, guesses = parted(rivals_of(pose)[:_OFFERED])
     guesses += [*_turned(own), *copies(views, own.T, own.agreement.axes)]

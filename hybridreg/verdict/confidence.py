@@ -49,7 +49,7 @@ SPEAKS = {
     "relief_correlation": 1,
     "weakest": 1,
     "matched": 1,
-    "recipes": 1,
+    "found_by": 1,
     "visible_less": 0,
     "visible_more": 0,
     "fitness_visible_less": 1,

@@ -121,7 +121,7 @@ def weigh(scene: Scene, pose: Pose) -> Weighed:
     own = Hypothesis(
         at=at,
         by_surfaces=at.by_surfaces,
-        recipes=pose.recipes,
+        found_by=pose.found_by,
         matched=match_agreement.share(scene, pose.T),
     )
     offered = rivals.find(scene, at, pose) if pose.found else []
@@ -134,7 +134,7 @@ def weigh(scene: Scene, pose: Pose) -> Weighed:
 def evidence_of(own: Hypothesis, found: list[Hypothesis], size: Size) -> Evidence:
     """All facts about a hypothesis beside its rivals, the likeliest of these first."""
     agreement = own.at.agreement
-    evidence = Evidence.at(agreement, own.at.information, own.recipes, own.matched, own.closeness)
+    evidence = Evidence.at(agreement, own.at.information, own.found_by, own.matched, own.closeness)
     support = log_odds(evidence)
     cosine, rmse = _surfaces(agreement.source, own.at.views.target)
     (looked, hidden, covered), (looked_back, hidden_back, covered_back) = _seen(agreement)

@@ -85,8 +85,8 @@ def test_a_refined_pose_remembers_how_it_was_found(
     stage: hr.Icp | hr.Gicp, courtyard_scene: tuple[Scene, np.ndarray]
 ) -> None:
     scene, truth = courtyard_scene
-    found = stage(scene, Pose(truth, rivals=np.eye(4)[None], recipes=3))
-    assert found.recipes == 3
+    found = stage(scene, Pose(truth, rivals=np.eye(4)[None], found_by=3))
+    assert found.found_by == 3
     assert len(found.rivals) == 1
 
 

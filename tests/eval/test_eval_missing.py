@@ -100,7 +100,7 @@ def test_nothing_is_said_where_all_is_there(pairs: list[LabelledPair], tmp_path:
 def test_every_recipe_missing_is_an_error(hide: Callable[..., None], pairs: list[LabelledPair]) -> None:
     hide("kiss_matcher")
     only = Candidates(of=({"estimate": "kiss"}, {"estimate": {"stage": "kiss", "scale": 2.0}}), refine="none")
-    with pytest.raises(ImportError, match="none of its 2 recipes can be run here.*kiss-matcher"):
+    with pytest.raises(ImportError, match="none of its 2 entries can be run here.*kiss-matcher"):
         hr.Pipeline(match="none", estimate=only, refine="none").run(pairs[0].pair)
     some = Candidates(of=({"estimate": "kiss"}, {"estimate": "birdseye"}), refine="none")
     result = hr.Pipeline(match="none", estimate=some, refine="none").run(pairs[0].pair)

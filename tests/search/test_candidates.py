@@ -113,18 +113,18 @@ def test_poses_that_meet_are_one() -> None:
     assert run(offers("one", TRUTH, TRUTH), offers("two", TRUTH), enough=1.0).rivals.shape == (0, 4, 4)
 
 
-def test_a_pose_that_several_entries_came_to_counts_as_many_recipes() -> None:
+def test_a_pose_that_several_entries_came_to_counts_as_found_by_as_many() -> None:
     one = run(offers("one", TRUTH), enough=1.0)
     two = run(offers("one", TRUTH), offers("two", WRONG, TRUTH), enough=1.0)
-    assert (one.recipes, two.recipes) == (1, 2)
+    assert (one.found_by, two.found_by) == (1, 2)
     assert np.allclose(one.T, two.T, atol=1e-9)  # settled beside another pose, the last bits differ
     apart = run(offers("one", TRUTH), offers("two", WRONG), enough=1.0)
-    assert apart.recipes == 1
+    assert apart.found_by == 1
     doubt, belief = (weigh(sample_scene()[0], pose) for pose in (one, two))
     # Recipes count in the confidence alone.
     assert belief.evidence.support == pytest.approx(doubt.evidence.support, abs=1e-6)
     assert belief.confidence >= doubt.confidence
-    assert belief.evidence.recipes == 2.0
+    assert belief.evidence.found_by == 2.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -198,7 +198,7 @@ def test_an_entry_that_fails_does_not_stop_the_others(failing: dict[str, Any]) -
     pose = run(failing, offers("two", TRUTH), scene=scene)
     assert is_right(pose.T)
     if isinstance(failing["estimate"], Breaks):
-        assert scene.notes == ["a candidate (Breaks) was left out: no weights here; download some"]
+        assert scene.notes == ["an entry (Breaks) was left out: no weights here; download some"]
     if isinstance(failing["estimate"], NeedsImage):
         assert "needs an image" in scene.notes[0]
 
@@ -274,7 +274,7 @@ def test_the_pipeline_comes_back_from_its_file(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("fields", "words"),
     [
-        ({"of": ()}, "no recipe at all"),
+        ({"of": ()}, "no entry at all"),
         ({"of": ({"match": "fpfh"},)}, "needs `estimate`"),
         ({"of": ({"overlap": "none", "estimate": "ransac"},)}, "with that, `overlap`"),
         ({"of": ({"estimate": "kiss", "refine": "gicp"},)}, "holds estimate, refine"),

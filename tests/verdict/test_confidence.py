@@ -30,7 +30,7 @@ EVIDENCE = {
     "relief_correlation": st.floats(-1.0, 1.0),
     "weakest": st.floats(0.0, 1.0 / 3.0),
     "looked_least": st.floats(0.0, 3000.0),
-    "recipes": st.integers(1, 5),
+    "found_by": st.integers(1, 5),
     "matched": share,
     "closeness": st.floats(-3.0, 0.0),
     "overturned": st.sampled_from([0.0, 1.0]),
@@ -60,7 +60,7 @@ def test_more_agreement_and_fewer_objections_never_lower_the_support(
     numbers: Evidence, name: str, step: float
 ) -> None:
     against = "through" in name
-    more = -step if against else 1 if name == "recipes" else step
+    more = -step if against else 1 if name == "found_by" else step
     assert log_odds(replace(numbers, **{name: getattr(numbers, name) + more})) >= log_odds(numbers)
 
 
@@ -79,7 +79,7 @@ def test_the_rule_weighs_the_terms_and_nothing_else() -> None:
         relief_cells=200.0,
         relief_correlation=0.3,
         weakest=0.02,
-        recipes=1,
+        found_by=1,
         matched=0.4,
         closeness=-0.2,
         overturned=0.0,

@@ -110,7 +110,7 @@ def _ranked(scene: Scene, found: list[Hypothesis], truths: Sequence[Array], metr
         poses = [*poses, (Hypothesis(at=at, by_surfaces=at.by_surfaces, matched=matched), True)]
     told = told_apart([one.but(closeness=0.0) for one, _ in poses])
     evidence = [
-        Evidence.at(one.at.agreement, one.at.information, one.recipes, one.matched, one.closeness)
+        Evidence.at(one.at.agreement, one.at.information, one.found_by, one.matched, one.closeness)
         for one in told
     ]
     return {
