@@ -130,6 +130,12 @@ def _anchors(text: str) -> set[str]:
     return {re.sub(r"[-\s]+", "-", re.sub(r"[^\w\s-]", "", title).strip().lower()) for title in titles}
 
 
+def test_no_line_of_code_is_wider_than_its_frame() -> None:
+    cells = [cell["text"] for path in NOTEBOOKS for cell in _cells(path) if cell["kind"] == "code"]
+    fenced = [f[2] for page in PAGES for f in FENCE.finditer(page.read_text(encoding="utf-8"))]
+    assert not [line for block in cells + fenced for line in block.splitlines() if len(line) > 78]
+
+
 def _referred() -> list[str]:
     return [
         name

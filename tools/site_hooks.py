@@ -20,7 +20,9 @@ ROOT = Path(__file__).resolve().parent.parent
 # `hybridreg.classical` and its like lie beside the package in a checkout; names are read where a wheel has them.
 _API = ROOT / "build" / "api"
 _BESIDE = ("classical", "eval", "learned")
-_CODE = re.compile(r"<code>((?:hr\.|hybridreg\.)?([A-Za-z_]\w*)((?:\.\w+)*)(?:\(\))?)</code>")
+_CODE = re.compile(
+    r"<code>((?:hr\.|hybridreg\.)?([A-Za-z_]\w*)((?:\.\w+)*)(?:\([^<]*\))?)</code>(?!</a>|</autoref>)"
+)
 
 
 def on_startup(**_: Any) -> None:
