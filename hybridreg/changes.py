@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What changes in a pipeline, written down: a line of a table file, or `--set` on the command line."""
+"""Changes to a pipeline as text: a line of a table file, or `--set` on the command line."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ KEYS = ("preset", "pipeline", "voxel", *SLOTS)
 
 
 def build(changes: Mapping[str, Any]) -> Pipeline:
-    """Pipeline of a preset (or a pipeline's file) and what differs from it.
+    """Pipeline from a preset (or a pipeline file) and the changes to it.
 
     Parameters
     ----------
     changes : mapping
-        `preset` a name or `pipeline` a TOML file, `voxel` metres, and for each slot a stage's name, a table
-        with `stage` for another stage, or a table without it for other fields of the stage that is there.
+        `preset` a name or `pipeline` a TOML file, `voxel` metres, and for each slot a stage's name, a table with
+        `stage` for another stage, or a table without it for other fields of the present stage.
 
     Raises
     ------
@@ -34,7 +34,7 @@ def build(changes: Mapping[str, Any]) -> Pipeline:
     """
     unknown = set(changes) - set(KEYS)
     if unknown:
-        raise ValueError(f"{', '.join(sorted(unknown))}: unknown; a pipeline is told by {', '.join(KEYS)}")
+        raise ValueError(f"{', '.join(sorted(unknown))}: unknown; a pipeline is given by {', '.join(KEYS)}")
     if "preset" in changes and "pipeline" in changes:
         raise ValueError(
             f"preset={changes['preset']!r} and pipeline={changes['pipeline']!r}: leave one of them out"
@@ -47,13 +47,13 @@ def build(changes: Mapping[str, Any]) -> Pipeline:
         name = changes.get("preset", presets.DEFAULT)
         start, what = Pipeline(**presets.load(name)), f"preset {name!r}"
     built = apply(start, {key: value for key, value in changes.items() if key in SLOTS or key == "voxel"})
-    # Now, not before: the weights may be what was changed.
+    # Only now: the weights may be what was changed.
     shipped_weights.require({slot: getattr(built, slot) for slot in SLOTS}, what)
     return built
 
 
 def apply(pipeline: Pipeline, changes: Mapping[str, Any]) -> Pipeline:
-    """The pipeline with some slots filled anew, or some fields of a slot's stage changed."""
+    """The pipeline with other stages in some slots, or other fields of a slot's stage."""
     slots: dict[str, Any] = {}
     for slot, change in changes.items():
         if isinstance(change, Mapping) and "stage" not in change:

@@ -12,7 +12,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from hybridreg.camera_image import Photograph
+from hybridreg.camera_image import CameraImage
 from hybridreg.cloud import PointCloud
 from hybridreg.geometry import se3
 from hybridreg.geometry.viewpoint import Given
@@ -23,43 +23,43 @@ Gravity = Literal["known", "unknown"]
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Pair:
-    """What a pipeline receives. It has no field for the truth, so that no stage can peek.
+    """What a pipeline receives. It has no field for the true pose, so that no stage can see it.
 
     Attributes
     ----------
     source, target : PointCloud
         The source moves, the target stays.
     image : (H, W, 3) uint8 or None
-        One photograph of the common view, uncalibrated, RGB. Made of a path, it is decoded when it is first looked at;
-        `has_image` does not look.
+        A camera image of the common view, uncalibrated, RGB. Given as a path, it is decoded on first access;
+        `has_image` does not decode it.
     id : str
         Seeds the pair's random generator together with the run's seed.
     meta : mapping
-        Free facts for reports. Never the pose.
+        Anything that reports should show. Never the pose.
     gravity : "known" or "unknown"
-        "known": both clouds stand on the same side of their ground, so that a pose which turns the world over is wrong.
-        "unknown": they may not (an object that was turned over between two scans).
+        "known": both clouds stand on the same side of their ground, so that a pose which turns the world upside down
+        is wrong. "unknown": they may not (an object that was turned over between two scans).
     """
 
     source: PointCloud
     target: PointCloud
-    image: NDArray[np.uint8] | None = Photograph()  # type: ignore[assignment]  # noqa: RUF009
+    image: NDArray[np.uint8] | None = CameraImage()  # type: ignore[assignment]  # noqa: RUF009
     id: str = "pair"
     meta: Mapping[str, Any] = field(default_factory=dict)
     gravity: Gravity = "known"
 
     def with_clouds(self, source: PointCloud, target: PointCloud) -> Pair:
-        """The same pair of other clouds."""
+        """The same pair with other clouds."""
         return self.replaced(source=source, target=target)
 
     def replaced(self, **changes: Any) -> Pair:
-        """The same pair with some fields changed; an image that was not decoded yet still is not."""
-        return replace(self, **{"image": Photograph.held_by(self), **changes})
+        """The same pair with some fields changed; an image that was not decoded yet stays undecoded."""
+        return replace(self, **{"image": CameraImage.held_by(self), **changes})
 
     @property
     def has_image(self) -> bool:
-        """Whether there is a photograph."""
-        return Photograph.held_by(self) is not None
+        """Whether there is an image."""
+        return CameraImage.held_by(self) is not None
 
     @classmethod
     def of(
@@ -98,7 +98,7 @@ class LabelledPair:
     T_target_source : (4, 4) float64
         Maps source points, as the user gave them, to target points.
     overlap : float or None
-        Share of source points that the target saw too, where the data set tells it.
+        Share of source points that the target's sensor saw too, where the data set gives it.
     """
 
     pair: Pair

@@ -29,7 +29,7 @@ from hybridreg.stage import Stage, own_params
 
 @dataclass(frozen=True, eq=False)
 class Trace:
-    """Everything the stages of one run made, in the levels' frames."""
+    """Everything that the stages of one run produced, in the levels' frames."""
 
     scene: Scene
     overlap: Overlap
@@ -100,7 +100,7 @@ class Pipeline(Stage):
         return {slot: spec.to_table(getattr(self, slot), slot) for slot in SLOTS}
 
     def swap(self, **stages: Any) -> Pipeline:
-        """A copy with some slots filled anew: `pipe.swap(estimate="ransac")`."""
+        """A copy with other stages in some slots: `pipe.swap(estimate="ransac")`."""
         unknown = set(stages) - {*SLOTS, "voxel"}
         if unknown:
             raise TypeError(
@@ -129,13 +129,13 @@ class Pipeline(Stage):
         Raises
         ------
         ValueError
-            For clouds that no pose can be computed from, naming cloud, number and cure; for a negative seed.
+            For clouds that no pose can be computed from (the message names cloud, number and cure), or a negative seed.
         """
         reset_peak_memory()
         return self.conclude(self.trace(pair, seed=seed, matches=matches), seed=seed)
 
     def conclude(self, trace: Trace, *, seed: int = 0) -> RegistrationResult:
-        """The verdict on a traced run, and its result in the coordinates that the user gave."""
+        """The verdict on a traced run, and its result in the user's coordinates."""
         pair = trace.scene.pair
         with stopwatch(trace.seconds, "verdict"):
             from hybridreg.verdict import judge
@@ -160,7 +160,7 @@ class Pipeline(Stage):
         )
 
     def trace(self, pair: Pair, *, seed: int = 0, matches: Any = None) -> Trace:
-        """Run the stages and keep what each of them made."""
+        """Run the stages and keep what each of them produced."""
         from hybridreg.evidence.match_agreement import of_most
 
         fitting.check_image(self, pair)
@@ -201,7 +201,7 @@ def _places(cloud: PointCloud) -> str:
 
 
 def _proper(pose: Pose) -> Pose:
-    # A stage may return float32 or a matrix that drifted; what leaves the pipeline is a rotation to the last digit.
+    # A stage may return float32 or a matrix that drifted; what the pipeline returns is a rotation to the last digit.
     T: NDArray[np.float64] = np.array(pose.T, dtype=np.float64)
     if T.shape != (4, 4) or not np.isfinite(T).all():
         return Pose.unknown(0 if pose.inliers is None else len(pose.inliers))

@@ -31,36 +31,36 @@ class RegistrationResult:
     Attributes
     ----------
     transformation : (4, 4) float64
-        Maps source points to target points, `q = R p + t`, in the coordinates that the user gave. Its rotation
-        is orthogonal with determinant +1. `T_target_source` is another name for it.
+        Maps source points to target points, `q = R p + t`, in the user's coordinates. Its rotation is orthogonal with
+        determinant +1. `T_target_source` is another name for it.
     verdict : "ok", "doubtful" or "failed"
     confidence : float in [0, 1]
         Estimated probability that the pose is right, to `tolerance`.
     reasons : tuple of str
-        Why the verdict is what it is, in words.
+        The verdict explained in sentences, most serious first.
     overlay : Overlay
-        Both whole clouds at the pose, on which `fitness` and what goes with it is measured when first asked for.
+        Both whole clouds at the pose, on which `fitness` and its companions are computed on first access.
     information : (6, 6) float64
         Sum of J^T J of point-to-plane distances in metres at the pose, rotation (radians) before translation,
-        about the centre of the overlap; a small eigenvalue is a direction that the data leaves open.
+        about the centre of the overlap; a small eigenvalue is a poorly constrained direction.
     rivals : (r, 4, 4) float64
         Other poses that explain the data nearly as well.
     matches : Correspondences
-        What the pose was estimated from, in the coordinates that the user gave; where several matchers ran, those
-        matches that agree with the pose best.
+        What the pose was estimated from, in the user's coordinates; where several matchers ran, the matches of the one
+        that agrees best with the pose.
     evidence : mapping of str to float
         The numbers behind the verdict.
     notes : tuple of str
-        Defaults that were chosen and caps that bit.
+        Defaults that were chosen and limits that were reached.
     seconds : mapping of str to float
         Wall time of each stage.
     peak_memory_mb : float or None
-        Highest resident memory of the process during the run.
+        Peak resident memory of the process during the run.
     seed : int
     spec : mapping
-        The pipeline that made it, as `Pipeline.save` writes it.
+        The pipeline that produced it, as `Pipeline.save` writes it.
     tolerance : Tolerance
-        What "right" means to `confidence`: within so many degrees, and so many metres at the middle of the source.
+        What "right" means for `confidence`: within these degrees, and these metres at the middle of the source.
     """
 
     transformation: Array
@@ -81,7 +81,7 @@ class RegistrationResult:
 
     @property
     def T_target_source(self) -> Array:
-        """The transformation, under the name that tells its direction."""
+        """The transformation, under the name that states its direction."""
         return self.transformation
 
     @property
@@ -101,12 +101,12 @@ class RegistrationResult:
 
     @property
     def fitness_target(self) -> float:
-        """The share seen from the target."""
+        """The same share for the target's points."""
         return self.overlay.of_target.fitness
 
     @property
     def max_distance(self) -> float:
-        """Farthest that two points of `correspondence_set` lie apart, metres."""
+        """Largest distance between two points of `correspondence_set`, metres."""
         return self.overlay.max_distance
 
     def to_dict(self) -> dict[str, Any]:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Pictures of what the stages of one run made: matches by correctness, and the overlap mask beside the photograph."""
+"""Pictures of what the stages of one run made: matches by correctness, and the overlap mask beside the camera image."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ def mask(path: str | os.PathLike[str], trace: Trace, T_true: Array) -> None:
     """Write a PNG of both clouds from above, coloured by what the overlap mask says of them and what is true.
 
     A point overlaps when the other cloud, under the true pose, has a point within twice the levels' spacing; it is
-    kept when its probability is above one half. The photograph stands beside them where there is one.
+    kept when its probability is above one half. The camera image stands beside them where there is one.
     """
     scene, overlap = trace.scene, trace.overlap
     in_source, in_target = true_overlap(scene, T_true)
@@ -81,7 +81,7 @@ def mask(path: str | os.PathLike[str], trace: Trace, T_true: Array) -> None:
         scores = metrics.mask_scores(kept, true)
         axes.set_title(f"{name}: precision {scores.precision:.2f}, recall {scores.recall:.2f}")
     figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower left", ncols=4, markerscale=6)
-    _photograph(panels[2], scene.pair.image)
+    _image_panel(panels[2], scene.pair.image)
     save(figure, path)
 
 
@@ -93,9 +93,9 @@ def _kinds(axes: Any, points: Array, kept: Bools, true: Bools) -> None:
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal", xlabel="x, m")
 
 
-def _photograph(axes: Any, image: NDArray[np.uint8] | None) -> None:
+def _image_panel(axes: Any, image: NDArray[np.uint8] | None) -> None:
     axes.set_axis_off()
-    axes.set_title("no photograph" if image is None else "photograph")
+    axes.set_title("no image" if image is None else "image")
     if image is not None:
         axes.imshow(image)
 

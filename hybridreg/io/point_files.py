@@ -58,13 +58,13 @@ PARSERS: dict[str, Parser] = {
 
 
 def read_points(path: str | os.PathLike[str]) -> NDArray[np.float64]:
-    """Read the coordinates of a point cloud, in the file's own frame; metres where it tells another unit.
+    """Read the coordinates of a point cloud in the file's own frame, converted to metres where the file gives a unit.
 
     The file name's ending chooses the format: `.ply` (ascii, binary), `.pcd` (ascii, binary,
     binary_compressed), `.bin` (float32 rows of three to six numbers, as KITTI and nuScenes have four and five),
     `.npy`, `.npz` (array `xyz`, `points`, `arr_0` or the only one that fits), text (`.xyz`, `.txt`, `.csv`, `.tsv`,
     `.asc`, `.pts`, `.xyzn`, `.xyzrgb`, `.xyzi`), `.las`/`.laz` (extra `las`).
-    A file that is not what its name says is refused. Rows that are not finite are kept: the gate decides about them.
+    A file that is not what its name says is refused. Rows that are not finite are kept: the gate deals with them.
 
     Parameters
     ----------
@@ -93,7 +93,7 @@ def read_points(path: str | os.PathLike[str]) -> NDArray[np.float64]:
 
 
 def read_viewpoint(path: str | os.PathLike[str]) -> NDArray[np.float64] | None:
-    """Where the sensor stood, (3,) in the file's own frame and unit, as a `.pcd` file may tell; else None.
+    """Where the sensor stood, (3,) in the file's own frame and unit, as a `.pcd` file may give it; otherwise None.
 
     Raises
     ------
