@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Full simulated pairs a second (scene, two scans, photograph, overlap) and what one costs.
+"""Full simulated pairs a second (scene, two scans, camera image, overlap) and what one costs.
 
 python -m benchmarks.simulator_speed [--pairs 30] [--workers 1 2]
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Pictures of what the stages of one run made: matches by correctness, and the overlap mask beside the photograph."""
+"""Pictures of what the stages of one run made: matches by correctness, and the overlap mask beside the camera image."""
 
 from __future__ import annotations
 
@@ -117,9 +117,9 @@ def _kinds(axes: Any, points: Array, kept: Bools, true: Bools) -> None:
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal", xlabel="x, m")
 
 
-def _photograph(axes: Any, image: NDArray[np.uint8] | None) -> None:
+def _image_panel(axes: Any, image: NDArray[np.uint8] | None) -> None:
     axes.set_axis_off()
-    axes.set_title("no photograph" if image is None else "photograph")
+    axes.set_title("no image" if image is None else "image")
     if image is not None:
         axes.imshow(image)
 

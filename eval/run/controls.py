@@ -35,7 +35,7 @@ class Control:
     Attributes
     ----------
     oracle : replace its overlap stage by the true overlap
-    image : let it see the photograph
+    image : let it see the camera image
     """
 
     pipeline: Pipeline

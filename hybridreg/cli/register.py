@@ -29,7 +29,7 @@ class NonFinite(str, Enum):
 def command(
     source: Annotated[Path, typer.Argument(help="The cloud that moves: ply, pcd, npy, las, e57, a bag ...")],
     target: Annotated[Path, typer.Argument(help="The cloud that stays.")],
-    image: Annotated[Path | None, typer.Option(help="A photograph of the common view.")] = None,
+    image: Annotated[Path | None, typer.Option(help="A camera image of the common view.")] = None,
     preset: options.Preset = None,
     pipeline: options.PipelineFile = None,
     settings: options.Settings = None,

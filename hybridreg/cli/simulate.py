@@ -26,7 +26,7 @@ def command(
         float | None, typer.Option(help="Thin to one point per cube of this edge, metres.")
     ] = None,
 ) -> None:
-    """Draw pairs of two different LiDARs with a photograph each; a run that was cut off goes on."""
+    """Draw pairs of two different LiDARs with a camera image each; a run that was cut off goes on."""
     from rich.console import Console
     from rich.progress import Progress
 

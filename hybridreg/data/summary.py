@@ -30,7 +30,7 @@ class Summary:
     Attributes
     ----------
     n_pairs, n_read, n_images : int
-        Pairs in the set; read for this; of those, with a photograph.
+        Pairs in the set; read for this; of those, with a camera image.
     fields : tuple of str
         Columns of the data set's own list.
     roles : mapping of "source" and "target" to counts by (sensor's name, kind by `hybridreg.data.lists.azimuth`)

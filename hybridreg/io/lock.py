@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""One writer at a time: a lock that ends with its process, however that ends, and tells others who holds it."""
+"""One writer at a time: a lock that ends with its process, however that ends, and names its holder to others."""
 
 from __future__ import annotations
 
@@ -23,19 +23,19 @@ _NAME = ".hybridreg-lock"
 
 
 class InUse(ValueError):
-    """Another process is writing there; the message tells which, and since when."""
+    """Another process is writing there; the message says which, and since when."""
 
 
 class Lock:
     """Holds the file `path` within a `with` block; what a killed writer left half written beside it is removed.
 
-    The system's own lock (flock) lies on the file, so that it ends with a killed owner. Where the file system knows
-    no locks, that the file is there is the lock: that of a process of this host that is gone is taken over, one of
-    another host must be deleted by hand; a warning tells of it.
+    The system's own lock (flock) lies on the file, so that it ends with a killed owner. Where the file system has no
+    locks, the existence of the file is the lock: one left by an ended process of this host is taken over, one of
+    another host must be deleted by hand, with a warning.
 
     Parameters
     ----------
-    path : the lock's file, which goes when the block ends
+    path : the lock file, removed when the block ends
     what : what is being written, for messages
 
     Raises

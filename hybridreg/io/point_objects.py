@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Objects that hold points, as drivers, kits and tools hand them out: known by what they have, without imports."""
+"""Objects that hold points, from drivers, development kits and tools: recognised by their attributes, without
+imports."""
 
 from __future__ import annotations
 
@@ -22,12 +23,12 @@ _CURE = "pass an array of shape (N, 3), such as numpy.column_stack([x, y, z])"
 
 
 def points_of(x: Any, name: str, depth: int = 0) -> Array:
-    """Coordinates (N, 3), a copy, of whatever holds them; what is masked or missing is NaN.
+    """Coordinates (N, 3), a copy, of whatever holds them; masked or missing values are NaN.
 
     Raises
     ------
     ValueError
-        Nothing there holds points, or it is a mesh, which is no cloud; the message tells what to pass instead.
+        Nothing there holds points, or it is a mesh and not a cloud; the message says what to pass instead.
     """
     if isinstance(x, np.ndarray):
         return _from_array(x, name)
@@ -109,7 +110,7 @@ def _held(x: Any) -> Any:
 
 
 def _named_rows(rows: Any) -> Any:
-    # What is read by position is read wrongly where the rows tell names.
+    # Reading by position would be wrong where the rows have names.
     first = rows[0]
     if isinstance(first, Mapping):
         return {key: [row.get(key) for row in rows] for key in first}

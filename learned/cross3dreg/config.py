@@ -80,7 +80,7 @@ class BackboneConfig:
 
 @dataclass(frozen=True, kw_only=True)
 class ImageConfig:
-    """Residual U-Net on the photograph (docs/methods.md 4)."""
+    """Residual U-Net on the camera image (docs/methods.md 4)."""
 
     height: int = 288
     width: int = 512

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""From a photograph to the tensor that the image encoder takes."""
+"""From a camera image to the tensor that the image encoder takes."""
 
 from __future__ import annotations
 

@@ -25,7 +25,7 @@ STILL = {"voxel": 0.5, "match": "none", "estimate": "identity", "refine": "none"
 
 
 class Yards(Scattered):
-    """Pairs with a photograph, as the made courtyards have."""
+    """Pairs with a camera image, as the made courtyards have."""
 
     def load(self, index: int) -> LabelledPair:
         pair, T = testing.sample_pair(index, 900)

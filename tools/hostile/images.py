@@ -54,7 +54,7 @@ class PixelCase:
 
 @dataclass(frozen=True, kw_only=True)
 class ImageFileCase:
-    """An encoded photograph, damaged, whatever its name says."""
+    """An encoded camera image, damaged, whatever its name says."""
 
     kind: ClassVar[str] = "images"
     allowed: ClassVar[tuple[type[BaseException], ...]] = (ValueError,)

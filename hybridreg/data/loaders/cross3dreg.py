@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Cross3DReg: a spinning and a semi-solid-state LiDAR with photographs, 13 231 pairs (arXiv 2509.06456)."""
+"""Cross3DReg: a spinning and a semi-solid-state LiDAR with camera images, 13 231 pairs (arXiv 2509.06456)."""
 
 from __future__ import annotations
 

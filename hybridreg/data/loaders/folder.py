@@ -26,7 +26,7 @@ class PairFolder(Dataset):
     ----------
     root : path
         `root/<id>/source.*` and `target.*` are clouds of any format that `hybridreg.io` reads, `image.*` is a
-        photograph, and `meta.json` holds `T_target_source`, 4x4, row by row, metres; perhaps `source_viewpoint` and
+        camera image, and `meta.json` holds `T_target_source`, 4x4, row by row, metres; perhaps `source_viewpoint` and
         `target_viewpoint`: [x, y, z] where the sensor stood in its cloud's frame, "none", or
         {"places": [[x, y, z], ...], "of_point": [row of each point's place, ...]}.
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Draws one pair: scene, stands, two scans, a photograph, the truth."""
+"""Draws one pair: scene, stands, two scans, a camera image, the truth."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybridreg.data.simulate.difficulty import TIERS, Tier, tier_named
-from hybridreg.data.simulate.sensing.camera import Camera, photograph
+from hybridreg.data.simulate.sensing.camera import Camera, render_image
 from hybridreg.data.simulate.sensing.caster import Part, World
 from hybridreg.data.simulate.sensing.jpeg import encode
 from hybridreg.data.simulate.sensing.light import Light
@@ -137,5 +137,5 @@ def _disjoint(tier: Tier, sensors: tuple[Sensor, Sensor], streams: _Streams) -> 
 def _picture(world: World, layout: Layout, T_world_source: np.ndarray, rng: np.random.Generator) -> bytes:
     """JPEG, as cameras deliver it; drawn pictures pass through it too, so that files read back identically."""
     camera = Camera.near(T_world_source, rng)
-    picture = photograph(world, layout.surface, camera, Light.draw(rng), rng)
+    picture = render_image(world, layout.surface, camera, Light.draw(rng), rng)
     return encode(picture, int(rng.integers(72, 93)))

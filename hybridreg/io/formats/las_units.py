@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The unit of a LAS file's coordinates, as its coordinate reference system tells it."""
+"""The unit of a LAS file's coordinates, from its coordinate reference system."""
 
 from __future__ import annotations
 
@@ -53,13 +53,13 @@ def in_metres(points: Array, records: Any, name: str) -> Array:
 
 
 def told(records: Any) -> Unit:
-    """What the records of a header tell; metres where they tell nothing that is understood."""
+    """The unit that the records of a header give; metres where they give none that is understood."""
     for record in records:
         keys, text = getattr(record, "geo_keys", None), getattr(record, "string", None)
         if getattr(record, "record_id", None) == 2112 and isinstance(text, str) and text.strip("\0 "):
             return _of_text(text)
         if keys is not None:
-            # A value that lies elsewhere has a tag; those asked for here never do.
+            # A value that is stored elsewhere has a tag; those read here never are.
             values = {key.id: key.value_offset for key in keys if key.tiff_tag_location == 0}
             across = _LENGTHS.get(values.get(_ACROSS, 9001), 1.0)
             up = _LENGTHS.get(values.get(_UP, 9001), 1.0) if _UP in values else across

@@ -33,7 +33,7 @@ def parse_npz(data: bytes, name: str) -> NDArray[np.float64]:
 
 
 def _refuse_bomb(member: zipfile.ZipInfo, label: str) -> None:
-    # zipfile unpacks no more than the directory promises, so the promise is what has to be believable.
+    # zipfile unpacks no more than the directory promises, so it is the promise that has to be plausible.
     packed, unpacked = member.compress_size, member.file_size
     if unpacked > _MODEST and unpacked > _MOST_EXPANSION * packed:
         raise fault(label, f"would unpack from {packed} to {unpacked} bytes, as no cloud does")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A photograph of roughly what the source sees, by an uncalibrated camera."""
+"""A camera image of roughly what the source sees, by an uncalibrated camera."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ class Camera:
         return turned(d, self.T_world_camera[:3, :3])
 
 
-def photograph(
+def render_image(
     world: World, surface: Surface, camera: Camera, light: Light, rng: np.random.Generator
 ) -> NDArray[np.uint8]:
     """RGB picture (288,512,3) uint8 with sun, sky, haze, texture, vignette and noise."""
