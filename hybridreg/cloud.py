@@ -78,7 +78,7 @@ class PointCloud:
             write for missing returns, where they are 1 % of the points or more; "raise" warns of them.
         viewpoint : "auto", "none", (3,), (N, 3), or ((k, 3), (N,))
             Where the sensor stood, in the coordinates of the points: one place, one for each point, or places and the
-            row of each point's. "none" is right for a map, a CAD model or a merged cloud whose viewpoints are not known:
+            row of each point's. "none" is right for a map, a CAD model or a merged cloud whose viewpoints are unknown:
             free space is then not tested. "auto" takes the viewpoint in the file, or tests whether a sensor may have
             stood at the origin (`hybridreg.geometry.viewpoint`).
         select : Selection

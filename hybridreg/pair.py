@@ -17,6 +17,7 @@ from hybridreg.geometry import se3
 from hybridreg.geometry.placement import Placement
 from hybridreg.geometry.pose_bounds import PoseBounds
 from hybridreg.geometry.viewpoint import Given
+from hybridreg.io.camera_image import CameraImage
 
 Array = NDArray[np.float64]
 Gravity = Literal["known", "unknown"]

@@ -106,7 +106,7 @@ def draw_masks(panels: Any, trace: Trace, T_true: Array, threshold: float = 0.5)
             note.partition("the ")[2] for note in scene.notes if note.startswith(f"{name}: the overlap mask")
         ]
         axes.set_xlabel(fallback[0].partition(" (")[0] if fallback else "x, m", fontsize=8)
-    _photograph(panels[2], scene.pair.image)
+    _image_panel(panels[2], scene.pair.image)
 
 
 def _kinds(axes: Any, points: Array, kept: Bools, true: Bools) -> None:

@@ -27,7 +27,7 @@ def build(cls: type[T], values: Mapping[str, Any], where: str) -> T:
     unknown = sorted(set(values) - set(hints))
     if unknown:
         raise ValueError(f"{where}: unknown keys {unknown}; known are {sorted(hints)}")
-    missing = [f.name for f in dataclasses.fields(cls) if _required(f) and f.name not in values]  # type:
+    missing = [f.name for f in dataclasses.fields(cls) if _required(f) and f.name not in values]  # type: ignore[arg-type]
     if missing:
         raise ValueError(f"{where}: {', '.join(missing)} missing")
     return cls(**{name: value_of(hints[name], value, f"{where}.{name}") for name, value in values.items()})
