@@ -36,6 +36,7 @@ ORDER = (
         "candidates",
         "changes",
         "fitting",
+        "many",
         "output",
         "pipeline",
         "presets",

@@ -8,7 +8,19 @@ from typing import Annotated
 import typer
 
 import hybridreg
-from hybridreg.cli import datasets, demo, doctor, evaluate, listing, register, report, simulate, table, train
+from hybridreg.cli import (
+    batch,
+    datasets,
+    demo,
+    doctor,
+    evaluate,
+    listing,
+    register,
+    report,
+    simulate,
+    table,
+    train,
+)
 
 app = typer.Typer(
     name="hybridreg",
@@ -35,6 +47,7 @@ def _common(
 
 
 app.command("register")(register.command)
+app.command("batch")(batch.command)
 app.command("eval")(evaluate.command)
 app.command("table")(table.command)
 app.command("report")(report.command)

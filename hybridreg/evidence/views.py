@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -85,7 +86,9 @@ def _both(scene: Scene) -> tuple[View, View]:
     # Side by side: most of it is sorting and trees, which each take one thread.
     with ThreadPoolExecutor(min(2, n_threads())) as pool:
         source = pool.submit(_view, scene, "source", wanted, on_grid)
-        target = pool.submit(_view, scene, "target", wanted, on_grid)
+        key = ("view", wanted, scene.target.spacing, on_grid.spacing, scene.pair.gravity)
+        make = partial(_view, scene, "target", wanted, on_grid)
+        target = pool.submit(scene.pair.target.once, key, make)
         return source.result(), target.result()
 
 
