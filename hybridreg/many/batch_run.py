@@ -58,8 +58,8 @@ def run(
     target_viewpoint: Any = "auto",
     on_row: Callable[[Row], None] = lambda row: None,
 ) -> list[Row]:
-    """Register every pair that the folder does not hold yet: `rows.jsonl` grows as they are done, `poses.csv` is written
-    at the end.
+    """Register every pair that the folder does not hold yet: `rows.jsonl` grows as they are done, `poses.csv` is
+    written at the end.
 
     Each target is prepared once in each process (`Target`). A pair that cannot be read or registered is a row with its
     `error`, and verdict "failed".
