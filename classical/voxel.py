@@ -5,11 +5,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import partial
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from hybridreg.cloud import PointCloud
 from hybridreg.geometry.voxel_cells import voxel_centroids
 from hybridreg.pair import Pair
 from hybridreg.resolution import comparable, default_voxel
@@ -66,22 +68,24 @@ class VoxelGrid(Stage):
             return _each_by_itself(pair)
         voxel = self.voxel or default_voxel(pair.source, pair.target)
         reached = voxel
-        points = [voxel_centroids(cloud.points, voxel) for cloud in clouds]
+        points = [_cells(cloud, voxel) for cloud in clouds]
         at = [voxel, voxel]
         while self.voxel is None and (most := max(map(len, points))) > _MOST_POINTS:
             voxel = _two_digits_up(voxel * (most / _MOST_POINTS) ** 0.5)
             for k, cloud in enumerate(clouds):
                 if len(points[k]) > _MOST_POINTS:
-                    points[k], at[k] = voxel_centroids(cloud.points, voxel), voxel
+                    points[k], at[k] = _cells(cloud, voxel), voxel
         for k, cloud in enumerate(clouds):  # one of few points follows when the voxel is found
             if at[k] != voxel:
-                points[k] = voxel_centroids(cloud.points, voxel)
+                points[k] = _cells(cloud, voxel)
         spacing = [voxel, voxel]
         if self.density == "match":
             dense = int(np.argmax([len(p) for p in points]))
             points[dense], spacing[dense] = _thin(clouds[dense].points, voxel, len(points[1 - dense]))
         source, target = (
-            Level(points=p, spacing=s, viewpoint=c.viewpoint)
+            c.once(
+                ("level", s, len(p)), partial(Level, points=p, spacing=s, viewpoint=c.viewpoint)
+            )  # no other grid of one spacing has as many cells
             for p, s, c in zip(points, spacing, clouds, strict=True)
         )
         scene = Scene(pair=pair, source=source, target=target)
@@ -107,6 +111,10 @@ def _each_by_itself(pair: Pair) -> Scene:
     scene = Scene(pair=pair, source=source, target=target)
     scene.note(f"voxels {source.spacing:.3g} and {target.spacing:.3g} m: the clouds' reaches are so unlike")
     return scene
+
+
+def _cells(cloud: PointCloud, voxel: float) -> Array:
+    return cloud.once(("cells", voxel), partial(voxel_centroids, cloud.points, voxel))
 
 
 def _two_digits_up(length: float) -> float:

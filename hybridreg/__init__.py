@@ -46,6 +46,9 @@ if TYPE_CHECKING:
     from hybridreg.learned.stages.omp import Omp
     from hybridreg.learned.stages.vgam import Vgam
     from hybridreg.learned.vrhcf.stage import Vrhcf
+    from hybridreg.many.alignment import Alignment
+    from hybridreg.many.register_all import register_all
+    from hybridreg.many.target import Target
     from hybridreg.matches import Correspondences, Overlap, Pose
     from hybridreg.pair import LabelledPair, Pair
     from hybridreg.pipeline import Pipeline, Trace
@@ -83,6 +86,9 @@ _WHERE = {
     "hybridreg.learned.stages.omp": ["Omp"],
     "hybridreg.learned.stages.vgam": ["Vgam"],
     "hybridreg.learned.vrhcf.stage": ["Vrhcf"],
+    "hybridreg.many.alignment": ["Alignment"],
+    "hybridreg.many.register_all": ["register_all"],
+    "hybridreg.many.target": ["Target"],
     "hybridreg.matches": ["Correspondences", "Overlap", "Pose"],
     "hybridreg.pair": ["LabelledPair", "Pair"],
     "hybridreg.pipeline": ["Pipeline", "Trace"],

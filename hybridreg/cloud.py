@@ -4,9 +4,10 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Callable, Hashable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, Literal
+from typing import Any, Literal, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +20,7 @@ from hybridreg.io import read_recorded, read_viewpoint
 from hybridreg.io.recorded.recording import ANY, Recorded, Selection
 
 Array = NDArray[np.float64]
+Value = TypeVar("Value")
 
 # Coordinates above this are a map grid's, not a sensor's: 10 km leaves float32 code 1 mm of resolution.
 _MAP_GRID = 1e4
@@ -42,6 +44,8 @@ class PointCloud:
         Where it was seen from, as a caller or a data set says; None has `guess` tested.
     guess : (3,) float64 or None
         The viewpoint to test: the one in the file, or the frame's origin.
+    kept : dict or None
+        Of a prepared target (`hybridreg.many.target`), what `once` keeps for the next registration.
     """
 
     points: Array
@@ -50,6 +54,7 @@ class PointCloud:
     dropped: int = 0
     said: Seen | None = None
     guess: Array | None = None
+    kept: dict[Hashable, Any] | None = field(default=None, repr=False)
 
     @classmethod
     def of(
@@ -89,6 +94,7 @@ class PointCloud:
         ValueError
             Naming the cloud, the number that is wrong and a cure.
         """
+        x = getattr(x, "prepared", x)
         if isinstance(x, PointCloud):
             gate.check(x.points, name)
             said = given(viewpoint, len(x), name)
@@ -117,6 +123,19 @@ class PointCloud:
             said=None if said is None else said.of(rows).less(offset),
             guess=None if place is None else place - offset,
         )
+
+    def once(self, key: Hashable, make: Callable[[], Value]) -> Value:
+        """`make()`; of a prepared target what it gave the first time."""
+        if self.kept is None:
+            return make()
+        if key not in self.kept:
+            self.kept[key] = make()
+        value: Value = self.kept[key]
+        return value
+
+    def __getstate__(self) -> dict[str, Any]:
+        # What is found out again need not travel between processes.
+        return {**self.__dict__, "kept": None if self.kept is None else {}}
 
     def __len__(self) -> int:
         return len(self.points)

@@ -15,6 +15,8 @@ Array = NDArray[np.float64]
 
 # Cells along the extent. On vehicle LiDAR (extent 25-50 m) this gives 0.4-0.8 m, in a room 5 cm.
 _CELLS_ALONG_REACH = 60.0
+# Steps of a derived voxel in a power of ten, for a prepared target: a quarter larger each.
+_STEPS = 10
 # Cell of a map seen from above: metres outdoors; in a room, this many along the distance within which nearly all
 # points lie.
 _MAP_CELL, _CELLS_ALONG_MAP, _NEARLY_ALL = 0.5, 60.0, 0.99
@@ -32,7 +34,11 @@ def default_voxel(source: PointCloud, target: PointCloud) -> float:
     shorter = min(reach(source.radii), reach(target.radii))
     # A cloud whose points lie nearly all in one place has no such extent; its bounding box is the next best.
     length = shorter or max(_longest(cloud) for cloud in (source, target))
-    return float(f"{length / _CELLS_ALONG_REACH:.2g}")
+    voxel = float(f"{length / _CELLS_ALONG_REACH:.2g}")
+    if voxel > 0.0 and (source.kept is not None or target.kept is not None):
+        # So that scans of one sensor share what is kept.
+        return float(f"{10.0 ** (round(_STEPS * np.log10(voxel)) / _STEPS):.2g}")
+    return voxel
 
 
 def map_cell(source: PointCloud, target: PointCloud) -> float:

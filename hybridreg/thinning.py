@@ -41,12 +41,16 @@ def _thinned(cloud: PointCloud, pair: Pair, voxel: float | None) -> PointCloud:
     if voxel is None:
         alike = comparable(pair.source, pair.target)
         voxel = default_voxel(pair.source, pair.target) if alike else reach(cloud.radii) / _CELLS_ALONG_REACH
+    return cloud.once(("thinned", voxel), lambda: _of_cells(cloud, voxel))
+
+
+def _of_cells(cloud: PointCloud, voxel: float) -> PointCloud:
     cells = voxel_cells(cloud.points, _cell(cloud, voxel))
     cells.centroids.setflags(write=False)
     said = cloud.said
     if said is not None and said.of_point is not None:
         said = said._replace(of_point=said.of_point[cells.first])
-    return replace(cloud, points=cells.centroids, said=said)
+    return replace(cloud, points=cells.centroids, said=said, kept=None if cloud.kept is None else {})
 
 
 def _cell(cloud: PointCloud, voxel: float) -> float:

@@ -35,6 +35,7 @@ ORDER = (
         "candidates",
         "changes",
         "fitting",
+        "many",
         "output",
         "pipeline",
         "presets",

@@ -9,6 +9,7 @@ import typer
 
 import hybridreg
 from hybridreg.cli import (
+    batch,
     datasets,
     demo,
     doctor,
@@ -47,6 +48,7 @@ def _common(
 
 
 app.command("register")(register.command)
+app.command("batch")(batch.command)
 app.command("eval")(evaluate.command)
 app.command("table")(table.command)
 app.command("report")(report.command)
