@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import os
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -109,7 +109,7 @@ class Lgr(Stage):
         from hybridreg.learned.cross3dreg.config import LgrConfig
 
         own = LgrConfig(acceptance_radius=spacing) if self.weights is None else _of_weights(self.weights)
-        given = {
+        given: dict[str, Any] = {
             "acceptance_radius": self.max_distance,
             "min_group": self.min_group,
             "steps": self.steps,
