@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from hybridreg.classical.overhead.birdseye import BirdsEye
     from hybridreg.classical.overhead.relief_search import ReliefSearch
     from hybridreg.classical.ransac import Ransac
+    from hybridreg.classical.ransac_50k import Ransac50k
     from hybridreg.classical.sampling import AllPoints, RandomSample
     from hybridreg.classical.svd import WeightedSvd
     from hybridreg.classical.visibility import Visibility
@@ -69,6 +70,7 @@ _WHERE = {
     "hybridreg.classical.kiss_icp": ["KissIcp"],
     "hybridreg.classical.nothing": ["GivenMatches", "Identity", "NoMatch", "NoOverlap", "NoRefinement"],
     "hybridreg.classical.ransac": ["Ransac"],
+    "hybridreg.classical.ransac_50k": ["Ransac50k"],
     "hybridreg.classical.overhead.relief_search": ["ReliefSearch"],
     "hybridreg.classical.sampling": ["AllPoints", "RandomSample"],
     "hybridreg.classical.svd": ["WeightedSvd"],

@@ -42,7 +42,7 @@ class Alignment:
     @property
     def placed(self) -> NDArray[np.bool_]:
         """Which clouds lie in the common frame, (n,)."""
-        found: NDArray[np.bool_] = np.isfinite(self.poses).all(axis=(1, 2))
+        found: NDArray[np.bool_] = np.asarray(np.isfinite(self.poses).all(axis=(1, 2)))
         return found
 
     @property
