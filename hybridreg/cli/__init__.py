@@ -12,7 +12,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     signal n."""
     try:
         from hybridreg.cli.app import app
-        from hybridreg.cli.console import make_ready
+        from hybridreg.cli.terminal.console import make_ready
     except (
         ImportError,
         MemoryError,

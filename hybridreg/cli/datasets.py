@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from hybridreg.cli import options
-from hybridreg.cli.error_messages import plainly
-from hybridreg.cli.stop_signals import going_on
+from hybridreg.cli.terminal.error_messages import plainly
+from hybridreg.cli.terminal.stop_signals import going_on
 
 if TYPE_CHECKING:
     from hybridreg.data.summary import Array, Summary

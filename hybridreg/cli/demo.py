@@ -10,8 +10,8 @@ from typing import Annotated
 import typer
 
 from hybridreg.cli import options
-from hybridreg.cli.error_messages import VERDICT_FAILED, plainly
 from hybridreg.cli.register import show
+from hybridreg.cli.terminal.error_messages import VERDICT_FAILED, plainly
 
 
 @plainly

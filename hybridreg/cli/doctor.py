@@ -8,7 +8,7 @@ import platform
 from collections.abc import Iterator
 from importlib.metadata import PackageNotFoundError, version
 
-from hybridreg.cli.error_messages import plainly, sentence
+from hybridreg.cli.terminal.error_messages import plainly, sentence
 
 # Module to distribution; what each is needed for.
 _NEEDED = {

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from hybridreg.cli import options
-from hybridreg.cli.command_line_cures import spoken
-from hybridreg.cli.error_messages import VERDICT_FAILED, plainly
+from hybridreg.cli.terminal.command_line_cures import spoken
+from hybridreg.cli.terminal.error_messages import VERDICT_FAILED, plainly
 
 if TYPE_CHECKING:
     from hybridreg.cloud import PointCloud

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from hybridreg.cli import options
-from hybridreg.cli.error_messages import plainly
+from hybridreg.cli.terminal.error_messages import plainly
 
 if TYPE_CHECKING:
     from hybridreg.eval.score.protocols import Protocol

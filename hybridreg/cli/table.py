@@ -10,7 +10,7 @@ from typing import Annotated
 import typer
 
 from hybridreg.cli import options
-from hybridreg.cli.error_messages import plainly
+from hybridreg.cli.terminal.error_messages import plainly
 
 
 @plainly

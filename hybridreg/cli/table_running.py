@@ -7,8 +7,8 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from hybridreg.cli.console import shown
-from hybridreg.cli.stop_signals import going_on
+from hybridreg.cli.terminal.console import shown
+from hybridreg.cli.terminal.stop_signals import going_on
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

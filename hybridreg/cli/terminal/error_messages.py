@@ -14,10 +14,10 @@ from typing import ParamSpec
 
 import typer
 
-from hybridreg.cli import stop_signals
-from hybridreg.cli.command_line_cures import spoken
-from hybridreg.cli.console import make_ready
-from hybridreg.cli.memory_errors import lacks_memory, memory_sentence, require_addresses
+from hybridreg.cli.terminal import stop_signals
+from hybridreg.cli.terminal.command_line_cures import spoken
+from hybridreg.cli.terminal.console import make_ready
+from hybridreg.cli.terminal.memory_errors import lacks_memory, memory_sentence, require_addresses
 from hybridreg.runtime import optional_packages
 
 BAD_INPUT, VERDICT_FAILED = 2, 3
