@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A table: several methods on the same pairs, run once and kept in a folder."""
+"""A table: several methods on the same pairs, run once and stored in a folder."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ _INDEX = "table.json"
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Entry:
-    """One method's rows; `config` is what made them."""
+    """One method's rows; `config` is how they were made."""
 
     name: str
     rows: list[Row]
@@ -44,10 +44,10 @@ class Table:
     Attributes
     ----------
     entries : the identity first, then the methods
-    starts : turned copies of each pair
-    problems : lines that could not be built or run, with the reason
-    left_out : what some lines did without, for want of a package
-    paper : figures that somebody printed, to be shown apart
+    starts : random yaw rotations of each pair
+    problems : rows of the file that could not be built or run, with the reason
+    left_out : what some rows ran without, for lack of a package
+    paper : published figures, shown separately
     """
 
     title: str
@@ -60,13 +60,13 @@ class Table:
     paper: Printed | None = None
 
     def remarks(self) -> list[str]:
-        """Sentences on what was not run."""
+        """Sentences on what was reported as "not run"."""
         without = (f"{name} ran without {text}" for name, text in self.left_out.items())
         return [*(f"Not run: {name}. {problem}" for name, problem in self.problems.items()), *without]
 
     @property
     def methods(self) -> list[Entry]:
-        """The entries but the identity."""
+        """The entries without the identity."""
         return [entry for entry in self.entries if entry.name != IDENTITY]
 
     def scores(self, protocol: Protocol) -> dict[str, scoring.Score]:
@@ -74,17 +74,18 @@ class Table:
         return {entry.name: scoring.score(entry.rows, protocol) for entry in self.entries if entry.rows}
 
     def caption(self, protocol: Protocol) -> str:
-        """Which number is this: the data, the starts, the protocol."""
+        """What the numbers are: the data, the yaw rotations, the protocol."""
         n = max((len(entry.rows) for entry in self.entries), default=0)
         runs = f"{n} pairs"
         if self.starts:
-            runs = f"{n // (self.starts + 1)} pairs, each as it is and under {self.starts} random yaw starts, {n} runs"
+            pairs = n // (self.starts + 1)
+            runs = f"{pairs} pairs, each as it is and under {self.starts} random yaw rotations, {n} runs"
         return f"{self.title}. Data {self.data or 'unnamed'}, {runs}; {protocol.describe()}"
 
 
 @dataclass(frozen=True, kw_only=True)
 class Index:
-    """What is noted of a table beside its predictions; `lines` are the names of those that were run."""
+    """What is stored of a table beside its predictions; `lines` are the names of the rows that were run."""
 
     title: str
     data: str
@@ -103,7 +104,7 @@ class Index:
 
 @dataclass(frozen=True, kw_only=True)
 class _MadeFrom:
-    """The data that stored rows are of."""
+    """The data that stored rows belong to."""
 
     name: str
     pairs: int
@@ -112,7 +113,7 @@ class _MadeFrom:
 
 @dataclass(frozen=True, kw_only=True)
 class _Made:
-    """What must agree between files of predictions that stand in one table."""
+    """What must agree between files of predictions in one table."""
 
     data: _MadeFrom
     seed: int
@@ -128,11 +129,11 @@ def run(
     overwrite: bool = False,
     on_row: Callable[[str, Row], None] | None = None,
 ) -> Table:
-    """Run every line of a recipe; what `out` already holds is not run again.
+    """Run every row of a table file; what `out` already holds is not run again.
 
     Parameters
     ----------
-    pairs : the data without the yaw starts that the recipe asks for
+    pairs : the data without the yaw rotations that the file asks for
     out : folder; the rows go to `out/predictions/<line>.jsonl`
     on_row : called with each line's name and row
 
@@ -256,14 +257,14 @@ def of_files(paths: Sequence[str | os.PathLike[str]]) -> Table:
 
 
 def read_index(folder: str | os.PathLike[str]) -> Index:
-    """What `run` noted of a table.
+    """What `run` stored of a table.
 
     Raises
     ------
     FileNotFoundError
         No table was run there.
     ValueError
-        The note is damaged.
+        The file is damaged.
     """
     path = Path(folder) / _INDEX
     if not path.is_file():

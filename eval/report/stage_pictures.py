@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Pictures of what the stages of one run made: matches by correctness, and the overlap mask beside the camera image."""
+"""Pictures of what the stages of one run produced: matches by correctness, and the overlap mask beside the camera
+image."""
 
 from __future__ import annotations
 
@@ -19,7 +20,7 @@ Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 
 RIGHT, WRONG, POINTS = "#1b9e77", "#d7301f", "#b8b8b8"
-# Kept and rightly so, kept wrongly, dropped wrongly, dropped and rightly so.
+# True positives, false positives, false negatives, true negatives of the mask.
 _KINDS = (
     ("kept, overlaps", RIGHT),
     ("kept, does not overlap", WRONG),
@@ -31,14 +32,14 @@ _MANY = 5000
 
 
 def matches(path: str | os.PathLike[str], trace: Trace, T_true: Array, inlier_m: float = 1.0) -> None:
-    """Write a PNG of both clouds from above, side by side and turned alike, with a line for every match.
+    """Write a PNG of both clouds from above, side by side in the same orientation, with a line for every match.
 
     The source is drawn under its true pose and moved to the right, so that right matches are parallel.
 
     Parameters
     ----------
     trace : of `Pipeline.trace`
-    T_true : (4, 4), source to target, between the clouds with their offsets taken off
+    T_true : (4, 4), source to target, between the clouds minus their offsets
     inlier_m : a match is right when it is off by less, metres
     """
     target, source = trace.scene.target.points, se3.apply(T_true, trace.scene.source.points)
@@ -63,7 +64,7 @@ def matches(path: str | os.PathLike[str], trace: Trace, T_true: Array, inlier_m:
 
 
 def mask(path: str | os.PathLike[str], trace: Trace, T_true: Array) -> None:
-    """Write a PNG of both clouds from above, coloured by what the overlap mask says of them and what is true.
+    """Write a PNG of both clouds from above, coloured by the overlap mask and by the true overlap.
 
     A point overlaps when the other cloud, under the true pose, has a point within twice the levels' spacing; it is
     kept when its probability is above one half. The camera image stands beside them where there is one.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The truth joined to what a method made, after it has returned."""
+"""Adds the ground truth to a method's result, after the method has returned."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ from hybridreg.pair import LabelledPair, Pair
 from hybridreg.pipeline import Trace
 from hybridreg.resolution import default_voxel
 
-# More source points than this change the overlap's measure in the third digit only.
+# More source points than this change the measured overlap only in the third digit.
 _SAMPLE = 10_000
 
 
 def row(index: int, labelled: LabelledPair, tried: Attempt) -> Row:
-    """The row of a pair: the attempt, and the truth measured against it."""
+    """The row of a pair: the attempt, measured against the true pose."""
     pair = labelled.pair
     return Row(
         index=index,
@@ -110,7 +110,7 @@ def _matched(matches: Correspondences | None, truth: metrics.Array) -> dict[str,
 
 
 def _mask(trace: Trace, labelled: LabelledPair) -> dict[str, float] | None:
-    # A mask that keeps every point is no prediction.
+    # A mask that keeps every point is not a prediction.
     predicted = np.concatenate([trace.overlap.source, trace.overlap.target])
     if np.all(predicted == 1.0):
         return None

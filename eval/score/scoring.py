@@ -17,7 +17,7 @@ from hybridreg.eval.score.protocols import RECALL_AT, Protocol
 Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 
-# A pair's features are called matched when this share of its matches is right (FMR).
+# A pair counts as matched at this inlier ratio (FMR).
 _MATCHED = 0.05
 
 
@@ -33,9 +33,8 @@ class Score:
     rre_deg_ok, rte_m_ok : means over successes
     rre_deg_criterion, rte_m_criterion : each over the pairs that meet that error's own threshold
     rre_deg_median, rte_m_median : over all pairs
-    inlier_ratio, fmr : mean share of right matches, and share of pairs with at least 5 % of them; NaN for a
-        method that makes no matches
-    recall_estimated : recall of the poses before refinement; NaN where a method does not tell them
+    inlier_ratio, fmr : mean inlier ratio, and share of pairs with at least 5 %; NaN for a method without matches
+    recall_estimated : recall of the poses before refinement; NaN where a method does not give them
     recall_at : recall at fixed thresholds, by their text
     mask_f1 : mean F1 of the overlap masks; NaN without them
     seconds : mean seconds a pair, by stage
@@ -113,12 +112,12 @@ def score(rows: Sequence[Row], protocol: Protocol) -> Score:
 
 
 def scene_of(row: Row) -> str:
-    """Name of the pair that a row's turned copies come from."""
+    """Name of the pair that a row's random yaw rotations come from."""
     return row.id.partition("@")[0]
 
 
 def identity(rows: Sequence[Row]) -> list[Row]:
-    """Rows of the method that does nothing, on the same pairs: what a failure on near-by pairs looks like."""
+    """Rows of the identity pose on the same pairs: what a failure on nearby pairs looks like."""
     eye = np.eye(4).tolist()
     return [
         Row(index=r.index, id=r.id, T=eye if r.T_true else None, T_true=r.T_true, overlap=r.overlap,
@@ -128,9 +127,9 @@ def identity(rows: Sequence[Row]) -> list[Row]:
 
 
 def inlier_ratios(rows: Sequence[Row], protocol: Protocol) -> Array:
-    """Share of right matches of each row at the protocol's radius; empty for a method that makes no matches.
+    """Inlier ratio of each row at the protocol's radius; empty for a method without matches.
 
-    A pair at which a method that matches has found none counts as 0.
+    A pair without any match counts as 0.
     """
     key = f"{protocol.inlier_m:g}"
     if not any(row.n_matches for row in rows):
@@ -143,7 +142,7 @@ def inlier_ratios(rows: Sequence[Row], protocol: Protocol) -> Array:
 
 
 def mean_seconds(rows: Sequence[Row]) -> dict[str, float]:
-    """Mean seconds of each stage over the rows that ran it, and of the whole."""
+    """Mean seconds of each stage over the rows that ran it, and in total."""
     stages = dict.fromkeys(stage for row in rows for stage in row.seconds)
     return {stage: float(np.mean([r.seconds[stage] for r in rows if stage in r.seconds])) for stage in stages}
 

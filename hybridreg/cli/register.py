@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 class NonFinite(str, Enum):
-    """What to do with points that are not finite."""
+    """How points that are not finite are treated."""
 
     refuse = "raise"
     drop = "drop"
@@ -47,7 +47,7 @@ def command(
     target_viewpoint: options.Viewpoint = "auto",
     gravity: Annotated[Up, typer.Option(help="'unknown' where one cloud may be upside down.")] = Up.known,
 ) -> None:
-    """Align two point clouds; print the pose, whether to believe it, and the seconds of each stage."""
+    """Align two point clouds; print the pose, the verdict on it, and the seconds of each stage."""
     from hybridreg.changes import build
     from hybridreg.pair import Pair
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The overlapping mask predictor: which superpoints does the other cloud share (docs/methods.md 5.1)."""
+"""The overlapping mask predictor (OMP): which superpoints lie in the overlap (docs/methods.md 5.1)."""
 
 from __future__ import annotations
 
@@ -21,15 +21,15 @@ class OverlapLogits:
 
     target: Tensor  # (m,)
     source: Tensor  # (n,)
-    informed: bool  # false: neither an image nor the other cloud was looked at
+    informed: bool  # false: neither an image nor the other cloud was available
 
 
 class OverlapPredictor(nn.Module):
     """Superpoint features query the image's tokens; one probability each. Both clouds share the weights.
 
-    ``formula="figure"`` is the paper's drawing (a post-norm transformer block), ``"text"`` its equation
-    ``MLP(A + FFN(A + X))``. ``cross_cloud`` lets each cloud look at the other first, without which there is
-    nothing to go by when there is no image.
+    ``formula="figure"`` follows the paper's figure (a post-norm transformer block), ``"text"`` its equation
+    ``MLP(A + FFN(A + X))``. ``cross_cloud`` first lets each cloud attend to the other, without which there is no
+    information when there is no image.
     """
 
     def __init__(self, config: OmpConfig, point_dim: int, image_dim: int) -> None:

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Visual-geometric attention: superpoints look at the image, then at their own cloud (docs/methods.md 6.1 to 6.5)."""
+"""Visual-geometric attention (VGAM): superpoints attend to the image, then to their own cloud (docs/methods.md 6.1 to
+6.5)."""
 
 from __future__ import annotations
 
@@ -21,7 +22,7 @@ from hybridreg.learned.layers.positions import PointPosition, image_grid_encodin
 
 
 class VisualAttention(nn.Module):
-    """``softmax((Q + E)(K + G)^T / sqrt(c)) (V + G)``: positions enter score and value (docs/methods.md 6.3)."""
+    """``softmax((Q + E)(K + G)^T / sqrt(c)) (V + G)``: positions enter scores and values (docs/methods.md 6.3)."""
 
     def __init__(self, dim: int, heads: int) -> None:
         super().__init__()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Which voxels a convolution kernel connects."""
+"""Kernel maps of sparse convolutions: which voxels a kernel connects."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class Pairs:
 
     @cached_property
     def transposed(self) -> Pairs:
-        """The same pairs turned round: MinkowskiEngine's transposed convolution, whose kernel is not flipped."""
+        """The same pairs swapped: MinkowskiEngine's transposed convolution, whose kernel is not flipped."""
         return Pairs(
             input=self.output,
             output=self.input,
@@ -61,7 +61,7 @@ class KernelMap:
 
     @cached_property
     def n_pairs(self) -> int:
-        """How many products there are."""
+        """Number of products."""
         return int((self.table < self.n_input).sum())
 
     @cached_property
@@ -83,7 +83,7 @@ class KernelMap:
 def kernel_offsets(size: int) -> Tensor:
     """(size^3, 3) int64 offsets (x, y, z) as MinkowskiEngine 0.5.4 numbers them (src/kernel_region.hpp).
 
-    x turns fastest; odd kernels are centred, even ones begin at 0.
+    x varies fastest; odd kernels are centred, even ones begin at 0.
     """
     z, y, x = torch.meshgrid(*[_line(size)] * 3, indexing="ij")
     return torch.stack([x, y, z], -1).reshape(-1, 3)
@@ -103,7 +103,7 @@ def kernel_map(inputs: Tensor, outputs: Tensor, size: int, stride: int) -> Kerne
     keys, line = VoxelKeys.spanning(inputs, outputs, margin=size), _line(size).to(inputs.device)
     have = keys.of(inputs)
     dz, dy = torch.meshgrid(line, line, indexing="ij")
-    # Neighbours along x have successive keys: one search finds the first of a row of the kernel, the others follow it.
+    # Neighbours along x have successive keys: one search finds the first of a kernel row, the others follow.
     rows = (keys.of(outputs)[:, None] + keys.step(dy, dz).flatten() + line[0]).flatten()
     table = torch.full((len(rows) * size,), len(inputs), dtype=torch.int32, device=rows.device)
     at, place = torch.arange(0, len(table), size, device=rows.device), torch.searchsorted(have, rows)

@@ -24,26 +24,26 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 Rows = NDArray[np.int64]
 
-# The published fit adds 1e-5 to the sum of the weights, which pulls it to the origin where they are faint.
+# The published fit adds 1e-5 to the sum of the weights, which pulls it towards the origin where they are small.
 _LARGEST_WEIGHT = 1e6
 
 
 @dataclass(frozen=True, kw_only=True)
 class Lgr(Stage):
-    """Each group of matches proposes a pose, all matches vote, those that agree refine it (GeoTransformer, 3.4).
+    """Each group of matches proposes a pose, all matches vote, inliers refine it (GeoTransformer, section 3.4).
 
     Parameters
     ----------
     max_distance : float or None
-        Metres; a match agrees with a pose when its residual is smaller. None takes the spacing of the points
-        that were matched where the matcher tells it (twice the voxel of the published networks, as they do), and
-        otherwise twice the scene's spacing.
+        Metres; a match agrees with a pose when its residual is smaller. None takes the spacing of the matched points
+        where the matcher gives it (twice the voxel of the published networks, as they do), and otherwise twice the
+        scene's spacing.
     min_group : int
         Groups of fewer matches propose nothing, but vote.
     steps : int
-        Fits to the matches that agree.
+        Number of fits to the inliers.
     max_votes : int or None
-        At most so many matches vote, those of the largest weight.
+        At most this many matches vote, those with the largest weights.
     rival_share : float in [0, 1]
         A pose far from the best one is a rival when its support is at least this share of the best one's.
     """

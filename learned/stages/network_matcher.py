@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What VGAM and GeoTransformer have in common as matchers."""
+"""The common part of VGAM and GeoTransformer as matchers."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ class NetworkMatcher(NetworkStage):
         Superpoints with a lower probability of overlap are left out, unless too few would remain. None takes
         the threshold that the network was trained with.
     filtered : bool
-        Leave out matches that do not move with the others, where the network's configuration has a distance for that
-        (`MatchingConfig.consistency`). Without it the matches are what the features alone say.
+        Leave out matches inconsistent with the others, where the network's configuration has a distance for that
+        (`MatchingConfig.consistency`). Otherwise the matches depend on the features alone.
     """
 
     min_overlap: float | None = None

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Lists of pairs as the field publishes them: the same facts under many names."""
+"""Published lists of pairs: the same facts under many names."""
 
 from __future__ import annotations
 
@@ -38,14 +38,16 @@ def read_records(path: Path) -> list[Record]:
     FileNotFoundError
         Nothing lies at `path`.
     ValueError
-        Empty, damaged, of another form, or with something that would run (`pickles.read_pickle`).
+        Empty, damaged, of another form, or with code that would run (`pickles.read_pickle`).
     """
     content, name = read_pickle(path), str(path)
     if isinstance(content, Mapping):
         content = _rows(content, name)
     if not isinstance(content, (list, tuple)) or not all(isinstance(each, Mapping) for each in content):
         kind = type(content).__name__
-        raise fault(name, f"holds a {kind} that is no list of dictionaries", "give the data set's own list")
+        raise fault(
+            name, f"holds a {kind} that is not a list of dictionaries", "give the data set's own list"
+        )
     if len(content) == 0:
         raise fault(name, "lists 0 pairs")
     return list(content)
@@ -93,7 +95,7 @@ def number(record: Record, aliases: Sequence[str], label: str) -> int:
     Raises
     ------
     ValueError
-        The field is not there, or holds none.
+        The field is missing, or holds no number.
     """
     value = need(record, aliases, label)
     if isinstance(value, (float, np.floating)):
@@ -110,12 +112,12 @@ def number(record: Record, aliases: Sequence[str], label: str) -> int:
 
 
 def overlap(record: Record, label: str) -> float | None:
-    """The overlap that the list tells, or None.
+    """The overlap that the list gives, or None.
 
     Raises
     ------
     ValueError
-        It is no share.
+        It is not a share.
     """
     value = find(record, ("overlap",))
     if value is None:
@@ -131,7 +133,7 @@ def transform_of(record: Record, label: str) -> Array:
     Raises
     ------
     ValueError
-        Neither is there, or they are no rigid motion.
+        Both are missing, or they are not a rigid motion.
     """
     whole = find(record, TRANSFORM)
     if whole is not None:

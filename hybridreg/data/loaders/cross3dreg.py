@@ -14,14 +14,15 @@ from hybridreg.data.lists.pair_files import PairFiles, read_scan
 from hybridreg.geometry import se3
 from hybridreg.io.faults import fault
 
-_SENSORS = ("lidar", "array")  # the archive does not say which of the two spins
+_SENSORS = ("lidar", "array")  # the archive does not say which of the two is spinning
 
 
 class Cross3DReg(ListedPairs):
     """The paper's own data set; its limits are 2 deg and 0.5 m.
 
-    Nothing but the archive's folders is known for certain: fields go by aliases (`hybridreg.data.lists.pair_records`),
-    the sensors' roles by geometry, and the first pair asked for has the direction of 20 poses checked.
+    Only the archive's folders are known for certain: fields are found by aliases
+    (`hybridreg.data.lists.pair_records`), the sensors' roles by geometry, and the first access checks the direction of
+    20 poses.
 
     Parameters
     ----------
@@ -37,7 +38,7 @@ class Cross3DReg(ListedPairs):
     FileNotFoundError
         Saying what is missing and where it must lie.
     ValueError
-        The list is empty, damaged, or asks for classes that a list of pairs has no use for.
+        The list is empty, damaged, or refers to classes that a list of pairs does not need.
     """
 
     def __init__(self, root: str | os.PathLike[str], split: str = "test", inverted: bool = False) -> None:
@@ -119,7 +120,7 @@ class _Archive:
         return next(filter(None, found), None)
 
     def _place(self, named: str, suffixes: tuple[str, ...]) -> Path:
-        # Lists made on the authors' machine may hold their paths: what counts begins at "sequences".
+        # Lists made on the authors' machine may contain their paths: the part from "sequences" on counts.
         parts = PurePosixPath(named.replace("\\", "/")).parts
         if "sequences" in parts:
             parts = parts[parts.index("sequences") :]
