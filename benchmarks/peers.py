@@ -162,7 +162,7 @@ def report(outcomes: list[Outcome], data: str, starts: int) -> str:
     """The summary with a caption that says what was run."""
     n = len({o.pair for o in outcomes})
     caption = (
-        f"{n} runs: the pairs in `{data}` as they are and under {starts} random yaw starts. "
+        f"{n} runs: the pairs in `{data}` as they are and under {starts} random yaw rotations. "
         "Success is 2 deg and 0.5 m; seconds are medians of one run on one machine, the ratio one over the pairs that "
         "the peer solves too."
     )
@@ -174,7 +174,7 @@ def main() -> None:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--data", default="../shared/data/real")
-    parser.add_argument("--starts", type=int, default=3, help="random yaw starts beside the pair as it is")
+    parser.add_argument("--starts", type=int, default=3, help="random yaw rotations beside the pair as it is")
     parser.add_argument("--presets", nargs="*", default=["default", "fpfh-ransac-gicp"])
     parser.add_argument("--rows", type=Path, help="one JSON line for each method and pair; resumes from it")
     parser.add_argument("--table", type=Path, help="write the summary as Markdown")

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Pictures of what the stages of one run made: matches by correctness, and the overlap mask beside the camera image."""
+"""Pictures of what the stages of one run produced: matches by correctness, and the overlap mask beside the camera
+image."""
 
 from __future__ import annotations
 
@@ -19,7 +20,7 @@ Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 
 RIGHT, WRONG, POINTS = "#1b9e77", "#d7301f", "#b8b8b8"
-# Kept and rightly so, kept wrongly, dropped wrongly, dropped and rightly so.
+# True positives, false positives, false negatives, true negatives of the mask.
 _KINDS = (
     ("kept, overlaps", RIGHT),
     ("kept, does not overlap", WRONG),
@@ -49,7 +50,7 @@ def draw_matches(axes: Any, trace: Trace, T_true: Array, inlier_m: float = 1.0) 
     Parameters
     ----------
     trace : of `Pipeline.trace`
-    T_true : (4, 4), source to target, between the clouds with their offsets taken off
+    T_true : (4, 4), source to target, between the clouds minus their offsets
     inlier_m : a match is right when it is off by less, metres
     """
     target, source = trace.scene.target.points, se3.apply(T_true, trace.scene.source.points)

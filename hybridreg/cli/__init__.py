@@ -17,7 +17,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         ImportError,
         MemoryError,
         OSError,
-    ) as error:  # too little memory for the imports alone, or half an install
-        sys.exit(f"hybridreg: {' '.join(str(error).split()) or 'the memory is not enough'}")
+    ) as error:  # too little memory even for the imports, or a broken installation
+        sys.exit(f"hybridreg: {' '.join(str(error).split()) or 'not enough memory'}")
     make_ready()
     app(None if arguments is None else list(arguments))

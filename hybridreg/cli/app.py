@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The commands, gathered."""
+"""The command line application and its commands."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from hybridreg.cli import (
 
 app = typer.Typer(
     name="hybridreg",
-    help="Register point clouds from different sensors, and score pipelines that do.",
+    help="Register point clouds from different sensors, and evaluate registration pipelines.",
     no_args_is_help=True,
     add_completion=False,
     pretty_exceptions_enable=False,

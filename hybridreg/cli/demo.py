@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""`hybridreg demo`: the main job on a pair that comes with the library."""
+"""`hybridreg demo`: registration of a pair that comes with the library."""
 
 from __future__ import annotations
 

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 class NonFinite(str, Enum):
-    """What to do with points that are not finite."""
+    """How points that are not finite are treated."""
 
     refuse = "raise"
     drop = "drop"
@@ -56,7 +56,7 @@ def command(
     crop_source: options.CropSource = None,
     scale: options.Scale = False,
 ) -> None:
-    """Align two point clouds; print the pose, whether to believe it, and the seconds of each stage."""
+    """Align two point clouds; print the pose, the verdict on it, and the seconds of each stage."""
     from hybridreg.changes import build
     from hybridreg.cloud import PointCloud
     from hybridreg.io.point_files import holds_several

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""How our tensors are called in OMNet's published checkpoints, and what the checkpoints' shapes tell."""
+"""Names of our tensors in OMNet's published checkpoints, and the configuration from a checkpoint's shapes."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def config_of(tensors: Mapping[str, Tensor], origin: str) -> OmnetConfig:
     Raises
     ------
     ValueError
-        The first iteration lacks a part: these are no weights of OMNet.
+        The first iteration lacks a part: these are not weights of OMNet.
     """
 
     def widths(part: str, block: str) -> tuple[int, ...]:

@@ -18,7 +18,7 @@ def find(name: str) -> Path:
     Raises
     ------
     FileNotFoundError
-        Neither is there.
+        Neither exists.
     """
     for file in (Path(name), Path(str(files(__name__).joinpath(f"{name}.toml")))):
         if file.is_file():

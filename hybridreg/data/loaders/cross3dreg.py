@@ -35,7 +35,7 @@ class Cross3DReg(ListedPairs):
     FileNotFoundError
         Saying what is missing and where it must lie.
     ValueError
-        The list is empty, damaged, or asks for classes that a list of pairs has no use for.
+        The list is empty, damaged, or refers to classes that a list of pairs does not need.
     """
 
     def __init__(

@@ -145,7 +145,7 @@ def test_a_published_checkpoint_is_a_stage(trained: str, tmp_path: Path) -> None
         for stage in (hr.OmNet.load_official(tmp_path / "omnet.pth", points=256), hr.OmNet(weights=trained))
     )
     assert np.allclose(one.T, two.T)
-    assert any("OMNet looked at 256 of" in note for note in scene.notes)
+    assert any("OMNet used 256 of" in note for note in scene.notes)
 
 
 def test_what_does_not_fit_is_refused(trained: str, monkeypatch: pytest.MonkeyPatch) -> None:
