@@ -19,9 +19,9 @@ from hybridreg.pair import Pair
 from hybridreg.prior import placing, size_search
 
 Array = NDArray[np.float64]
-# A start is often written down with few digits: a rotation that is off by less is meant as one, and is made exact
+# A start is often written down with two digits: a rotation that is off by less is meant as one, and is made exact
 # unless it is so already.
-_ROUNDED, _EXACT = 0.01, 1e-12
+_ROUNDED, _EXACT = 0.03, 1e-12
 _Z = np.array([0.0, 0.0, 1.0])
 
 
