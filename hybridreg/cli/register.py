@@ -88,7 +88,7 @@ def command(
             ("source", "target"), (source, target), (source_viewpoint, target_viewpoint), select, strict=True
         )
     ]
-    pair = Pair.of(*clouds, image)
+    pair = Pair.of(clouds[0], clouds[1], image)
     result = method.run(pair, seed=seed)
     show(result, form)
     write_clouds(clouds, result, aligned, merged)

@@ -109,9 +109,9 @@ class Prior:
         source, target = pair.source, pair.target
         crop = self.crop or {}
         if "source" in crop:
-            source = placing.within_box(source, *np.reshape(crop["source"], (2, 3)), "source")
+            source = placing.within_box(source, np.array(crop["source"]), "source")
         if "target" in crop:
-            target = placing.within_box(target, *np.reshape(crop["target"], (2, 3)), "target")
+            target = placing.within_box(target, np.array(crop["target"]), "target")
         if "radius" in crop:
             middle = se3.apply(start, (np.median(source.points, axis=0) + source.offset)[None])[0]
             target = placing.within_radius(target, middle, crop["radius"], "target")
