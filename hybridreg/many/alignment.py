@@ -42,8 +42,7 @@ class Alignment:
     @property
     def placed(self) -> NDArray[np.bool_]:
         """Which clouds lie in the common frame, (n,)."""
-        found: NDArray[np.bool_] = np.asarray(np.isfinite(self.poses).all(axis=(1, 2)))
-        return found
+        return np.asarray(np.isfinite(self.poses).all(axis=(1, 2)))
 
     @property
     def verdict(self) -> str:

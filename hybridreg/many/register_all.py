@@ -271,7 +271,7 @@ def _reasons(found: Alignment) -> Iterable[str]:
         if link.role == "contradicts":
             pair = f"{found.names[link.source]} -> {found.names[link.target]} ({link.verdict})"
             yield f"{pair} contradicts the other links and was left out"
-    for k in np.flatnonzero(~found.placed).tolist():
-        yield f"{found.names[k]} is not placed: nothing ties it to {found.names[found.reference]}"
+    for row in np.flatnonzero(~found.placed):
+        yield f"{found.names[row]} is not placed: nothing ties it to {found.names[found.reference]}"
     for k in found._hanging():
         yield f"{found.names[k]} hangs on one link, which nothing confirms"
