@@ -59,7 +59,9 @@ def test_a_mistake_names_its_key_and_what_would_do(
 
 
 def test_a_file_that_is_none(tmp_path: Path) -> None:
-    with pytest.raises(FileNotFoundError, match=r"no recipe of that name; known are .*paper, paper-a, .*smoke"):
+    with pytest.raises(
+        FileNotFoundError, match=r"no recipe of that name; known are .*paper, paper-a, .*smoke"
+    ):
         recipe_file.read("nothing")
     (tmp_path / "x.toml").write_text("size =")
     with pytest.raises(ValueError, match=r"x\.toml: not a TOML file"):
@@ -163,7 +165,9 @@ def test_a_folder_left_open_is_filled_everywhere(make_recipe: MakeRecipe) -> Non
 def test_the_papers_rows_are_recipes_of_their_own() -> None:
     rows = {letter: recipe_file.read(f"paper-{letter}").network for letter in "abc"}
     rows["d"] = recipe_file.read("paper").network
-    parts = {k: (n.omp is not None, n.vgam is not None, n.transformer.self_attention) for k, n in rows.items()}
+    parts = {
+        k: (n.omp is not None, n.vgam is not None, n.transformer.self_attention) for k, n in rows.items()
+    }
     assert parts == {
         "a": (False, False, "geometric"),
         "b": (True, False, "vanilla"),
