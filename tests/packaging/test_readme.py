@@ -16,7 +16,7 @@ from hybridreg.io import point_files
 from hybridreg.output.pose_text import FORMATS
 from hybridreg.runtime.open3d import load_open3d
 
-ROOT = Path(__file__).resolve().parent.parent
+ROOT = Path(__file__).resolve().parents[2]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 
 # What starts so is not run here, and why.
