@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Pairs a second that training takes on this machine: one process on the CPU, one and several on a graphics card.
+"""Pairs a second that training takes on this machine: one process on the CPU, one and several on a GPU.
 
 ``python -m benchmarks.training_speed --processes 1,4`` trains the recipe `warm-up` with each and reads its
-log. What is prepared is kept in ``--cache``.
+log. Prepared pairs are stored in ``--cache``.
 """
 
 from __future__ import annotations

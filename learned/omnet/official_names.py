@@ -40,7 +40,7 @@ def config_of(tensors: Mapping[str, Tensor], origin: str) -> OmnetConfig:
             found.append(weight.shape[0])
         if not found:
             raise ValueError(
-                f"{origin}: tensor {part}.0.{block}1.0.weight is missing, or no matrix; these are no weights of OMNet"
+                f"{origin}: tensor {part}.0.{block}1.0.weight is missing, or not a matrix: no weights of OMNet"
             )
         return tuple(found)
 
