@@ -134,5 +134,9 @@ def show(result: RegistrationResult, form: str = "matrix") -> None:
         print(f"  - {spoken(reason)}")
     for note in result.notes:
         print(f"note: {spoken(note)}")
+    if result.entries:
+        from hybridreg.output import result_words
+
+        print(f"found by: {result_words.found_by(result)}")
     stages = ", ".join(f"{stage} {seconds:.3f}" for stage, seconds in result.seconds.items())
     print(f"seconds: {stages}; together {sum(result.seconds.values()):.3f}")
