@@ -19,7 +19,9 @@ from hybridreg.cli.command_line_cures import spoken
 from hybridreg.cli.console import make_ready
 from hybridreg.cli.memory_errors import lacks_memory, memory_sentence, require_addresses
 
-BAD_INPUT, VERDICT_FAILED = 2, 3
+# Exit codes.
+BAD_INPUT = 2
+VERDICT_FAILED = 3
 
 P = ParamSpec("P")
 
