@@ -16,7 +16,9 @@ from tempfile import TemporaryDirectory
 import torch
 import typer
 
-_STEPS, _BATCH, _PAIRS = 30, 8, 40
+_STEPS = 30  # optimiser steps, by hand
+_BATCH = 8  # pairs a step, by hand
+_PAIRS = 40  # of each tier, by hand
 _RECIPE = """
 base = "warm-up"
 every = 0

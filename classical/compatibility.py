@@ -15,8 +15,9 @@ Rows = NDArray[np.int64]
 
 _BLOCK_VALUES = 1 << 22
 _EPS = 1e-6
-# The tolerances of torch.allclose, by which the published iteration stops.
-_RELATIVE, _ABSOLUTE = 1e-5, 1e-8
+# The published iteration stops by torch.allclose.
+_RELATIVE = 1e-5  # its rtol
+_ABSOLUTE = 1e-8  # its atol; no unit
 
 
 class Seeds(NamedTuple):

@@ -21,8 +21,10 @@ from hybridreg.stage import Stage
 Array = NDArray[np.float64]
 
 _FEWEST_NEIGHBOURS = 3  # span a plane
-# Step sizes at which a round has converged, and their factor in the rounds before the last.
-_STILL_RAD, _STILL_M, _COARSE = 1e-5, 1e-4, 100.0
+# Steps at which a round has converged.
+_STILL_RAD = 1e-5  # radians, by hand
+_STILL_M = 1e-4  # metres, by hand
+_COARSE = 100.0  # factor on both in the rounds before the last, by hand
 # Of the source points that lay on the target before, the share that must still do so afterwards.
 _KEPT = 0.9
 # Points farther from the target than this multiple of the widest search are left out.

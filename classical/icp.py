@@ -19,7 +19,9 @@ from hybridreg.stage import Stage
 Array = NDArray[np.float64]
 
 _FEWEST = 6
-_STILL_RAD, _STILL_M = 1e-6, 1e-5
+# Steps at which a round has converged.
+_STILL_RAD = 1e-6  # radians, by hand
+_STILL_M = 1e-5  # metres, by hand
 
 
 @dataclass(frozen=True, kw_only=True)

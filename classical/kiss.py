@@ -23,8 +23,10 @@ from hybridreg.stage import Stage
 Array = NDArray[np.float64]
 
 # Its C++ code (1.0.2) segfaults on clouds where no point has a neighbourhood to describe. In 1,500 random clouds all
-# 225 crashes had no point with five neighbours within the radius of its normals; twice as much is asked for here.
-_SUPPORTED_POINTS, _NEIGHBOURS, _NORMAL_RADIUS = 10, 6, 3.0
+# 225 crashes had no point with five neighbours within the radius of its normals; twice as much is required here.
+_SUPPORTED_POINTS = 10  # points with a neighbourhood, at least; by hand
+_NEIGHBOURS = 6  # of such a point, itself included
+_NORMAL_RADIUS = 3.0  # voxels; the radius of the wheel's normals
 _FEWEST_MATCHES = 3
 _SMALLEST_VOXEL = 0.01  # metres; below half of it the wheel raises RuntimeError
 _LARGEST_NOISE = 0.999

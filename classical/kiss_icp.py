@@ -18,8 +18,10 @@ from hybridreg.stage import Stage
 
 # The map drops points beyond this range; the target is one scan, none of which should be dropped.
 _EVERYTHING = 1e6
-# KISS-ICP's density: `max_points_per_voxel` of its configuration and the two samplings of its pipeline (1.3.0).
-_POINTS_PER_VOXEL, _MAP_SAMPLING, _SOURCE_SAMPLING = 20, 0.5, 1.5
+# KISS-ICP's density (1.3.0).
+_POINTS_PER_VOXEL = 20  # `max_points_per_voxel` of its configuration
+_MAP_SAMPLING = 0.5  # voxels; sampling of its map
+_SOURCE_SAMPLING = 1.5  # voxels; sampling of its source
 _REACH = 3.0  # sigmas
 
 

@@ -10,9 +10,10 @@ from hybridreg.geometry.consensus import Consensus, Support, distances
 
 Array = NDArray[np.float64]
 
-# Poses closer than both are one mode: 5 degrees, and a few times the distance at which matches agree
-# (2 to 3 m for vehicle LiDAR, decimetres in a room).
-_SAME_DEG, _SAME_DISTANCES = 5.0, 4.0
+# Poses closer than both are one mode.
+_SAME_DEG = 5.0  # degrees, by hand
+# Distances at which matches agree (2 to 3 m for vehicle LiDAR, decimetres in a room); by hand.
+_SAME_DISTANCES = 4.0
 _MOST_MODES = 8
 
 

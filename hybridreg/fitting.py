@@ -22,8 +22,8 @@ from hybridreg.slots import SLOTS
 if TYPE_CHECKING:
     from hybridreg.pipeline import Pipeline
 
-# Metres: no LiDAR reaches farther, and no sensor pair shares a smaller scene.
-_FARTHEST, _SMALLEST = 2_000.0, 0.05
+_FARTHEST = 2_000.0  # metres: no LiDAR reaches farther
+_SMALLEST = 0.05  # metres: no sensor pair shares a smaller scene
 # Cells along one axis beyond which the voxel or the unit is wrong: 1 cm cells over 1 km.
 _MANY_CELLS = 100_000
 # Below this the grid has merged the points that were to be matched.

@@ -15,11 +15,12 @@ Array = NDArray[np.float64]
 
 # Cells along the extent. On vehicle LiDAR (extent 25-50 m) this gives 0.4-0.8 m, in a room 5 cm.
 _CELLS_ALONG_REACH = 60.0
-# Steps of a derived voxel in a power of ten, for a prepared target: a quarter larger each.
+# Steps of a derived voxel in a power of ten, for a prepared target: a quarter larger each; by hand.
 _STEPS = 10
-# Cell of a map seen from above: metres outdoors; in a room, this many along the distance within which nearly all
-# points lie.
-_MAP_CELL, _CELLS_ALONG_MAP, _NEARLY_ALL = 0.5, 60.0, 0.99
+# Cell of a map seen from above.
+_MAP_CELL = 0.5  # metres outdoors; by hand
+_CELLS_ALONG_MAP = 60.0  # in a room, cells along the radius of nearly all points; by hand
+_NEARLY_ALL = 0.99  # share of the points; by hand
 # Of the extents of two sensors' clouds of one place the longer is seldom ten times the shorter.
 _MOST_RATIO = 25.0
 # The tolerance is at most this share of the shorter extent: half a metre says nothing about a small object.

@@ -11,9 +11,9 @@ from hybridreg.geometry.voxel_cells import voxel_cells, voxel_centroids
 from hybridreg.pair import Pair
 from hybridreg.resolution import comparable, default_voxel
 
-# Points above which a cloud is thinned, and cells kept along the edge of a voxel: surfaces are fitted, and free space
-# is tested, at no less than half a voxel.
-_MANY, _CELLS = 1_500_000, 4
+_MANY = 1_500_000  # points above which a cloud is thinned; by hand
+# Cells kept along the edge of a voxel: surfaces are fitted, and free space is tested, at no less than half a voxel.
+_CELLS = 4
 # Clouds of very different extent have a voxel each, as in `hybridreg.resolution`.
 _CELLS_ALONG_REACH = 60.0
 # Occupied cells per point above which a random sample fills a volume.

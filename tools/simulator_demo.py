@@ -13,7 +13,11 @@ from pathlib import Path
 from hybridreg.data import simulate
 from hybridreg.data.simulate.labelled import pair_id
 
-TIER, SPLIT, SEED, INDEX, VOXEL = "near", "val", 7, 0, 0.25
+TIER = "near"
+SPLIT = "val"
+SEED = 7
+INDEX = 0
+VOXEL = 0.25  # metres
 
 
 def main() -> None:

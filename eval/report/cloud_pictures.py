@@ -17,7 +17,8 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-_SOURCE, _TARGET = "#d95f02", "#3b6fb6"
+_SOURCE = "#d95f02"  # orange
+_TARGET = "#3b6fb6"  # blue
 _DRAWN = 30_000
 
 

@@ -21,7 +21,10 @@ Array = NDArray[np.float64]
 
 # Points drawn per cloud: enough to see walls and poles, few enough for a page with several views.
 THINNED = 4000
-BEFORE, AFTER, TRUE, TARGET = "#999999", "#d95f02", "#1b9e77", "#3b6fb6"
+BEFORE = "#999999"  # grey
+AFTER = "#d95f02"  # orange
+TRUE = "#1b9e77"  # green
+TARGET = "#3b6fb6"  # blue
 
 
 def recall_curves(rows: Mapping[str, Sequence[Row]], protocol: Protocol) -> list[Figure]:

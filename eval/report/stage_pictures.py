@@ -19,7 +19,9 @@ from hybridreg.pipeline import Trace
 Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 
-RIGHT, WRONG, POINTS = "#1b9e77", "#d7301f", "#b8b8b8"
+RIGHT = "#1b9e77"  # green
+WRONG = "#d7301f"  # red
+POINTS = "#b8b8b8"  # grey
 # True positives, false positives, false negatives, true negatives of the mask.
 _KINDS = (
     ("kept, overlaps", RIGHT),

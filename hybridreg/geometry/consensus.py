@@ -19,8 +19,8 @@ _CHUNK = 1 << 16
 # The expanded square cancels terms of the size of the extent's square. Where the threshold's square is larger
 # than this share of it, float32 keeps enough digits.
 _COARSE = 50.0 * float(np.finfo(np.float32).eps)
-# A refit that gains less than this share moves the pose by millimetres.
-_MOST_REFITS, _LEAST_GAIN = 10, 1e-3
+_MOST_REFITS = 10  # by hand
+_LEAST_GAIN = 1e-3  # share; a refit that gains less moves the pose by millimetres
 
 
 @dataclass(frozen=True, eq=False)

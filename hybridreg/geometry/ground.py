@@ -17,20 +17,26 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 Weights = NDArray[np.float64]
 
-# Half the thickness of the ground, as a plane follows uneven ground only so well: metres, but at most this share of
-# the cloud's extent (rooms), and at least this many spacings.
-_THICK, _OF_REACH, _SPACINGS = 0.25, 0.03, 0.6
+# Half the thickness of the ground, as a plane follows uneven ground only so well; by hand.
+_THICK = 0.25  # metres, at most
+_OF_REACH = 0.03  # of the cloud's extent, at most (rooms)
+_SPACINGS = 0.6  # spacings, at least
 # Metres: where all points lie in one place the above are zero.
 _THIN = 1e-9
-# Triples of points tried; how many of the best on a subset are kept; how many of these are fitted to all points.
-_TRIPLES, _LOOKED_AT, _FITTED = 4000, 120, 6
-_FEW, _MANY = 160, 1500
+_TRIPLES = 4000  # of points, tried; by hand
+_LOOKED_AT = 120  # of them that are best on `_FEW` points; by hand
+_FITTED = 6  # of these that are best on `_MANY`; by hand
+_FEW = 160  # points, by hand
+_MANY = 1500  # points, by hand
 # Least share of the cloud on the ground, minus the share below it.
 _LEAST = 0.1
 # A steep plane, or one far from the sensor, is more often a wall than the ground (in a lane the walls have several
-# times as many points). Sensors are more often upright than upside down.
-_STEEP_DEG, _STEEP = 40.0, 0.15
-_FAR_METRES, _FAR, _UPTURNED = 5.0, 0.5, 0.9
+# times as many points). Sensors are more often upright than upside down. All by hand.
+_STEEP_DEG = 40.0  # degrees from level
+_STEEP = 0.15  # factor on the score of a steep plane
+_FAR_METRES = 5.0  # metres below the sensor
+_FAR = 0.5  # factor on the score of a plane farther below
+_UPTURNED = 0.9  # factor on the score of a plane above the sensor's xy-plane
 
 
 class Ground(NamedTuple):

@@ -20,18 +20,21 @@ from hybridreg.geometry.ground import Ground
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-# In cells: radius within which a height is compared; how rough a cell of ground may be; how far it may lie from the
-# heights around it (a kerb, the foot of a wall); distance beyond which it does not count.
-_AROUND, _ROUGH, _KERB, _MOST = 6, 0.1, 0.3, 0.08
-# Distance of ground from the plane under the sensor, at most: this many cells, and this much more for each metre away
-# from it. What stands on it is looked for this many cells higher.
-_BAND, _SLOPE, _TALL = 1.2, 0.06, 4.0
+_AROUND = 6  # cells: radius of the surroundings that a height is compared with; by hand
+_ROUGH = 0.1  # cells: roughness of a cell of ground, at most; by hand
+_KERB = 0.3  # cells: its height over the surroundings, at most (a kerb, the foot of a wall); by hand
+_MOST = 0.08  # cells: heights are clipped at this; by hand
+# Distance of ground from the plane under the sensor, at most; by hand.
+_BAND = 1.2  # cells
+_SLOPE = 0.06  # and this much more for each metre away from the sensor
+_TALL = 4.0  # cells above that in which objects on the ground are looked for; by hand
 # Square cells added to the spread of the cells around, so that a single row of cells gives no slope across it.
 _FIRM = 1.0
-# Points that a cell needs for a height; cells to each side of the sensor.
-_POINTS, _REACH = 3, 120
-# Grounds that are tilted more against each other, or lie more cells apart, are not the same.
-_LEAN, _APART = float(np.cos(np.radians(20.0))), 4.0
+_POINTS = 3  # that a cell needs for a height; by hand
+_REACH = 120  # cells to each side of the sensor; by hand
+# Grounds that are tilted more against each other, or lie farther apart, are not the same; by hand.
+_LEAN = float(np.cos(np.radians(20.0)))  # cosine of the angle
+_APART = 4.0  # cells
 # Fewer common cells say nothing.
 _FEWEST = 20
 _CERTAIN = 0.999

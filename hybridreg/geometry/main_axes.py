@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 Rows = NDArray[np.int64]
 
-# Fixed-point steps to the main axes, at most, and their tolerance; each step about squares the error.
-_TURNS, _STILL = 12, 1e-6
+# Fixed-point steps to the main axes; each about squares the error.
+_TURNS = 12  # at most; by hand
+_STILL = 1e-6  # change at which they have converged, no unit; by hand
 # Normals of a cloud that the axes are computed from.
 _SAMPLE = 1_000
 

@@ -23,9 +23,8 @@ from hybridreg.runtime.cores import query_threads
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
-# The finest and coarsest cell, radians: below half a degree two clouds cannot be compared anyway, and above four
-# degrees a few stray returns would count as a field of view.
-_FINEST, _COARSEST = np.radians(0.5), np.radians(4.0)
+_FINEST = np.radians(0.5)  # cell: below half a degree two clouds cannot be compared anyway
+_COARSEST = np.radians(4.0)  # cell: above four degrees a few stray returns would count as a field of view
 # Cells are as wide as the gaps between returns when doubling them covers less than this much more of the sky. It
 # would be 1 for a sharp-edged field of view with even rings; uneven rings and ragged edges add to it.
 _FILLED = 1.5

@@ -12,8 +12,9 @@ from hybridreg.geometry.extent import bounds
 
 Array = NDArray[np.float64]
 
-# Points this close to the plane, plus this much for each metre of distance, may be ground: a slope of a few degrees.
-_NEAR, _SLOPE = 0.4, 0.08
+# Points this close to the plane may be ground; by hand.
+_NEAR = 0.4  # metres
+_SLOPE = 0.08  # and this much more for each metre of distance: a slope of a few degrees
 # Weight of the plane where cells around have no ground.
 _PLANE = 0.02
 # The lowest point of a cell lies below its ground by about the noise.

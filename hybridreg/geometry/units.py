@@ -17,12 +17,14 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 _UNITS = ((1e-3, "millimetres"), (1e-2, "centimetres"), (1e3, "kilometres"))
-# Extents of most scans, metres, from an object on a table to a street; and their geometric middle.
-_SHORTEST, _LONGEST, _USUAL = 0.3, 300.0, 15.0
-# Extents of two clouds of one place differ by less than this factor; and how far the ratio may be from that of a unit.
-_UNLIKE, _NEAR = 25.0, 5.0
-# Extent of a scan in degrees, at most; and the least ratio of its spread along z, which is in metres, to that.
-_DEGREES, _UPRIGHT = 0.2, 100.0
+# Extents of most scans, from an object on a table to a street; by hand.
+_SHORTEST = 0.3  # metres
+_LONGEST = 300.0  # metres
+_USUAL = 15.0  # metres, about the geometric middle
+_UNLIKE = 25.0  # factor: extents of two clouds of one place differ by less; by hand
+_NEAR = 5.0  # factor by which their ratio may differ from that of two units; by hand
+_DEGREES = 0.2  # degrees: extent of a scan in longitude and latitude, at most; by hand
+_UPRIGHT = 100.0  # least ratio to that of its spread along z, which is in metres; by hand
 _LOOKED_AT = 2_000
 
 

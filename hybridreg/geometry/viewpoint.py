@@ -24,20 +24,23 @@ Integers = NDArray[np.int64]
 # with each point's row among them.
 Given = Any
 
-# Share of neighbouring rays whose ranges differ by more than a fifth: at most 0.17 from the places of 52 sensors, real
-# and simulated, raw and thinned to 0.25 m; 0.2 to 0.6 from the ground under 45 of them.
-_DIFFER, _MOST_JUMPS = 1.2, 0.18
-# Rays that are compared; rays sampled for that, and the cells (radians) of which they fill some completely.
-_ASKED, _RAYS, _CELL = 2_000, 30_000, 0.1
+_DIFFER = 1.2  # ratio of neighbouring ranges from which they differ; by hand
+# Share of neighbouring rays that differ, at most: up to 0.17 from the viewpoints of 52 sensors, real and simulated,
+# raw and thinned to 0.25 m; 0.2 to 0.6 from the ground under 45 of them.
+_MOST_JUMPS = 0.18
+_ASKED = 2_000  # rays that are compared; by hand
+_RAYS = 30_000  # rays sampled for that; by hand
+_CELL = 0.1  # radians: cells of which the sampled rays fill some completely; by hand
 # A cloud that fills a narrower cone (radians) does not show where it was seen from.
 _NARROWEST = np.radians(4.0)
-# Least height of a sensor over the ground: metres, but at most this share of the cloud's extent.
-_LOWEST, _OF_REACH = 0.15, 0.05
-# Seen from this many times as high, less than this share of neighbouring rays differ if the origin lies in the ground.
-_LIFT, _FEWER = 10.0, 0.6
-# Share of points on one plane above which a cloud is flat: the scan of a single beam, not ground. Fewest points that
-# give its height.
-_FLAT, _FEWEST = 0.95, 20
+# Least height of a sensor over the ground; by hand.
+_LOWEST = 0.15  # metres
+_OF_REACH = 0.05  # of the cloud's extent, at most
+# Seen from this many least heights up, less than this share of the jumps remain if the origin lies in the ground.
+_LIFT = 10.0  # by hand
+_FEWER = 0.6  # by hand
+_FLAT = 0.95  # share of points on one plane above which it is a single beam's scan, not ground; by hand
+_FEWEST = 20  # points of a ground that give its height; by hand
 
 
 _ORIGIN = "the origin of its frame"

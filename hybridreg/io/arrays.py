@@ -16,9 +16,9 @@ Array = NDArray[np.float64]
 
 # Fields of one array that hold all three coordinates.
 TOGETHER = ("xyz", "points", "point", "positions", "position", "pos", "coords", "coord", "coordinates")
-# A cloud has at least 20 points, so 3 to 6 rows of at least that length are channels: x, y, z, w (or intensity), ring,
-# time.
-FEWEST, _MOST_CHANNELS = 20, 6
+FEWEST = 20  # points of a cloud, at least
+# So 3 to 6 rows of at least that length are channels: x, y, z, w (or intensity), ring, time.
+_MOST_CHANNELS = 6
 # Sensors have eight rows or more; a stack with fewer is more likely several clouds.
 _FEWEST_ROWS = 8
 # Of a raw LAS record: its X, Y and Z are whole numbers still to be scaled.

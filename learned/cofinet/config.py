@@ -12,7 +12,9 @@ from hybridreg.config import limits
 from hybridreg.config.plain_values import build
 from hybridreg.learned.kpfcnn.kpfcnn_config import KpfcnnConfig, architecture
 
-_WIDEST, _MOST_PAIRS = 8192, 1_000_000
+# A configuration may come with untrusted weights: absurd sizes are refused before memory is allocated. By hand.
+_WIDEST = 8192  # channels
+_MOST_PAIRS = 1_000_000  # of superpoints
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -13,8 +13,11 @@ from hybridreg.config.plain_values import build
 
 DEFAULT_NEIGHBOR_LIMITS = (65, 80, 60, 60, 65)
 
-# A configuration may come with untrusted weights: absurd sizes are refused before memory is allocated.
-_WIDEST, _MOST_KERNEL_POINTS, _MOST_BLOCKS, _MOST_NEIGHBORS = 8192, 256, 64, 10_000
+# A configuration may come with untrusted weights: absurd sizes are refused before memory is allocated. By hand.
+_WIDEST = 8192  # channels
+_MOST_KERNEL_POINTS = 256
+_MOST_BLOCKS = 64
+_MOST_NEIGHBORS = 10_000  # of a point
 
 
 @dataclass(frozen=True, kw_only=True)

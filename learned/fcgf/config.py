@@ -11,8 +11,10 @@ from typing import Any, Literal
 from hybridreg.config import limits
 from hybridreg.config.plain_values import build
 
-# Absurd sizes are refused before memory is allocated.
-_WIDEST, _WIDEST_KERNEL, _MOST_LEVELS = 8192, 9, 8
+# A configuration may come with untrusted weights: absurd sizes are refused before memory is allocated. By hand.
+_WIDEST = 8192  # channels
+_WIDEST_KERNEL = 9  # voxels
+_MOST_LEVELS = 8
 
 
 @dataclass(frozen=True, kw_only=True)

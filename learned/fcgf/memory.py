@@ -11,7 +11,8 @@ from hybridreg.learned.layers.sparse_conv import FEW_CHANNELS
 from hybridreg.learned.layers.voxels import VoxelPyramid
 from hybridreg.learned.memory_estimate import SLACK
 
-_FLOAT, _INDEX = 4, 8
+_FLOAT = 4  # bytes
+_INDEX = 8  # bytes
 _PER_PAIR = 2 * _INDEX  # a list of pairs stores its inputs and its outputs
 _COPIES = 3  # of a layer's output alive at a time: normalised, rectified, and what a block adds to it
 

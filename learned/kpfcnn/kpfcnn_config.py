@@ -11,7 +11,11 @@ from typing import Literal, NamedTuple
 from hybridreg.config import limits
 from hybridreg.learned.layers.kpconv_blocks import BlockPlan
 
-_WIDEST, _MOST_KERNEL_POINTS, _MOST_BLOCKS, _MOST_NEIGHBORS = 8192, 256, 64, 10_000
+# A configuration may come with untrusted weights: absurd sizes are refused before memory is allocated. By hand.
+_WIDEST = 8192  # channels
+_MOST_KERNEL_POINTS = 256
+_MOST_BLOCKS = 64
+_MOST_NEIGHBORS = 10_000  # of a point
 _ENCODING = ("simple", "simple_strided", "resnetb", "resnetb_strided")
 _DECODING = ("nearest_upsample", "unary", "last_unary")
 

@@ -10,7 +10,9 @@ import numpy.typing as npt
 
 _MEAN_RADIUS = 0.66
 _STEPS = 600
-_INNER, _OUTER = 0.45, 0.9  # radii of the half circles
+# Radii of the half circles, in search radii; by hand.
+_INNER = 0.45
+_OUTER = 0.9
 
 
 @lru_cache(maxsize=8)

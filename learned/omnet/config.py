@@ -11,8 +11,11 @@ from typing import Any, Literal
 from hybridreg.config import limits
 from hybridreg.config.plain_values import build
 
-# Absurd sizes are refused before memory is allocated.
-_WIDEST, _MOST_LAYERS, _MOST_ITERATIONS, _MOST_POINTS = 8192, 16, 32, 100_000
+# A configuration may come with untrusted weights: absurd sizes are refused before memory is allocated. By hand.
+_WIDEST = 8192  # channels
+_MOST_LAYERS = 16
+_MOST_ITERATIONS = 32
+_MOST_POINTS = 100_000
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -12,7 +12,10 @@ from hybridreg.config import limits
 from hybridreg.config.plain_values import build
 from hybridreg.learned.cross3dreg.config import LossConfig, MatchingConfig, TransformerConfig
 
-_WIDEST, _MOST_NEIGHBORS, _MOST_BLOCKS = 4096, 512, 64
+# A configuration may come with untrusted weights: absurd sizes are refused before memory is allocated. By hand.
+_WIDEST = 4096  # channels
+_MOST_NEIGHBORS = 512  # of a point
+_MOST_BLOCKS = 64
 
 
 def _transformer() -> TransformerConfig:

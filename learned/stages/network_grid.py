@@ -11,9 +11,8 @@ from numpy.typing import NDArray
 from hybridreg.geometry.voxel_cells import voxel_centroids
 from hybridreg.scene import Scene
 
-# Spacings that differ by less than the first factor count as equal; beyond the second the scene itself may be of
-# another size.
-_SAME, _ANOTHER_SCALE = 0.01, 2.0
+_SAME = 0.01  # relative difference below which two spacings are equal; by hand
+_ANOTHER_SCALE = 2.0  # factor beyond which the scene itself may be of another size; by hand
 
 
 def on_grid(scene: Scene, voxel: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

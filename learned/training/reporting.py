@@ -17,7 +17,8 @@ from hybridreg.learned.training.validation import Validation
 
 Row = Mapping[str, Any]
 # Columns of a line that are only for the file, and those that come last.
-_HIDDEN, _LAST = ("total", "phase", "step", "skipped", "data_share", "norm"), ("rate", "steps_per_s")
+_HIDDEN = ("total", "phase", "step", "skipped", "data_share", "norm")
+_LAST = ("rate", "steps_per_s")
 
 
 class Reporter:

@@ -11,7 +11,10 @@ from typing import Any, Literal
 from hybridreg.config import limits
 from hybridreg.config.plain_values import build
 
-_WIDEST, _MOST_CELLS, _MOST_POINTS = 4096, 512, 100_000
+# A configuration may come with untrusted weights: absurd sizes are refused before memory is allocated. By hand.
+_WIDEST = 4096  # channels
+_MOST_CELLS = 512  # along a coordinate
+_MOST_POINTS = 100_000
 
 
 @dataclass(frozen=True, kw_only=True)

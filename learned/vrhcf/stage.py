@@ -23,9 +23,10 @@ Array = NDArray[np.float64]
 Rows = NDArray[np.int64]
 
 # Multiply-adds for both clouds that a stage may take by default: about a minute of one CPU core, and of a GPU.
-_CPU_BUDGET, _GPU_BUDGET = 1.5e12, 4e14
-# The published scripts describe at most this many keypoints of a cloud.
-_MOST, _FEWEST = 5_000, 100
+_CPU_BUDGET = 1.5e12
+_GPU_BUDGET = 4e14
+_MOST = 5_000  # keypoints of a cloud; as in the published scripts
+_FEWEST = 100  # keypoints that an overlap mask must leave; by hand
 
 
 @dataclass(frozen=True, kw_only=True)

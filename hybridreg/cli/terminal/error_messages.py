@@ -20,7 +20,9 @@ from hybridreg.cli.terminal.console import make_ready
 from hybridreg.cli.terminal.memory_errors import lacks_memory, memory_sentence, require_addresses
 from hybridreg.runtime import optional_packages
 
-BAD_INPUT, VERDICT_FAILED = 2, 3
+# Exit codes.
+BAD_INPUT = 2
+VERDICT_FAILED = 3
 
 P = ParamSpec("P")
 

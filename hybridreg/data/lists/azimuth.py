@@ -13,7 +13,9 @@ Array = NDArray[np.float64]
 _BINS = 36
 # A bin with less than this share of the points holds stray returns and was not scanned.
 _STRAY = 0.002
-_SPINNING_DEG, _SPINNING_SHARE, _LIMITED_DEG = 300.0, 0.8, 200.0
+_SPINNING_DEG = 300.0  # degrees from first to last direction of a spinning sensor, at least; by hand
+_SPINNING_SHARE = 0.8  # of its bins that are occupied, at least; by hand
+_LIMITED_DEG = 200.0  # degrees of a limited field of view, at most; by hand
 
 
 @dataclass(frozen=True)

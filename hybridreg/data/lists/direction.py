@@ -19,8 +19,9 @@ from hybridreg.pair import LabelledPair
 Array = NDArray[np.float64]
 
 PAIRS = 20
-# More points than this change the overlap only in the third digit.
-_SOURCE, _TARGET = 4_000, 60_000
+# More points than these change the overlap only in the third digit.
+_SOURCE = 4_000
+_TARGET = 60_000
 # Below this the clouds hardly overlap in either direction.
 _HARDLY = 0.02
 

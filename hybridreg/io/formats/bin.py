@@ -11,16 +11,18 @@ from hybridreg.io.record_fields import stack_axes
 from hybridreg.io.signatures import looks_like_text
 
 _WIDTHS = (3, 4, 5, 6)
-_KITTI, _NUSCENES = 4, 5
+_KITTI = 4  # numbers a row
+_NUSCENES = 5
 _FARTHEST = 1e7  # metres: beyond any map grid, while bytes that are not coordinates go up to 1e38
 _MOST_RINGS = 1024
 _TOLERATED = 0.01  # share of rows that may contradict a layout
 _NO_HEADER = (
     "this format has no header to tell its layout, so convert it to .npy with one point (x, y, z) a row"
 )
-# Numbers sampled to find the width. A column differs from all numbers together when their distributions are further
-# apart than this multiple of the distance expected by chance, and by at least this much.
-_LOOKED_AT, _CHANCE, _LEAST = 120_000, 2.5, 0.06
+_LOOKED_AT = 120_000  # numbers sampled to find the width
+# A column differs from all numbers together when their distributions are further apart than both.
+_CHANCE = 2.5  # times the distance expected by chance; by hand
+_LEAST = 0.06  # distance of distributions (Kolmogorov and Smirnov's); by hand
 # A width explains the numbers as well as the best one from this share of its contrast on.
 _AS_GOOD = 0.9
 _BLOCK = 60  # numbers, a multiple of every width

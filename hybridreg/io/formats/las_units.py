@@ -14,10 +14,14 @@ from hybridreg.io.faults import fault
 
 Array = NDArray[np.float64]
 
-_FOOT, _SURVEY_FOOT = 0.3048, 1200 / 3937
+_FOOT = 0.3048  # metres, by definition
+_SURVEY_FOOT = 1200 / 3937  # metres, by definition
 # EPSG's codes of lengths, and the GeoTIFF keys that hold one: of x and y, of z; the key of the kind of system.
 _LENGTHS = {9001: 1.0, 9002: _FOOT, 9003: _SURVEY_FOOT}
-_ACROSS, _UP, _MODEL, _GEOGRAPHIC = 3076, 4099, 1024, 2
+_ACROSS = 3076  # ProjLinearUnitsGeoKey
+_UP = 4099  # VerticalUnitsGeoKey
+_MODEL = 1024  # GTModelTypeGeoKey
+_GEOGRAPHIC = 2  # ModelTypeGeographic
 _UNIT = re.compile(r'UNIT\s*\[\s*"[^"]*"\s*,\s*([0-9.eE+-]+)')
 
 

@@ -14,8 +14,9 @@ from hybridreg.io.faults import fault, foreign_parser
 from hybridreg.io.formats.npy import array_of_npy, npy_header
 
 _KEYS = ("xyz", "points", "arr_0")
+_MODEST = 2**28  # bytes that are unpacked in any case
 # Coordinates hardly compress (up to 20 times on a coarse grid); noise of zeros compresses a thousandfold.
-_MODEST, _MOST_EXPANSION = 2**28, 200
+_MOST_EXPANSION = 200
 _LONGEST_HEADER = 16384  # numpy itself refuses headers above 10000 bytes
 
 

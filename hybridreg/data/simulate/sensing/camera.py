@@ -17,10 +17,12 @@ from hybridreg.data.simulate.world.layout import Surface
 from hybridreg.data.simulate.world.materials import COLOUR, GLOSS, GROUND
 from hybridreg.data.simulate.world.texture import shade_factor
 
-WIDTH, HEIGHT = 512, 288
+WIDTH = 512  # pixels of the image
+HEIGHT = 288
 # Cameras measure one colour per pixel and interpolate the others: images resolve about half of their pixels.
 # So do these, which are rendered at the smaller size and enlarged.
-ACROSS, UP = 384, 216
+ACROSS = 384  # pixels that are rendered
+UP = 216
 SHADOWS = np.float32(300)  # metres over which objects cast them
 
 
