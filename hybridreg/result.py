@@ -34,6 +34,7 @@ class RegistrationResult:
         Maps source points to target points, `q = R p + t`, in the user's coordinates. Its rotation is orthogonal with
         determinant +1. `T_target_source` is another name for it.
     verdict : "ok", "doubtful" or "failed"
+        By `confidence`: "ok" from 0.95 on, "failed" below 0.5, "doubtful" in between: the evidence does not decide.
     confidence : float in [0, 1]
         Estimated probability that the pose is right, to `tolerance`.
     reasons : tuple of str

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Pipelines by name: TOML files beside this one, in the format that `Pipeline.save` writes."""
+"""Pipelines by name: TOML files next to this one, in the format that `Pipeline.save` writes."""
 
 from __future__ import annotations
 
