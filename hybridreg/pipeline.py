@@ -51,7 +51,7 @@ class Pipeline(Stage):
     Raises
     ------
     KeyError
-        A name that is not registered.
+        A name that nobody registered.
     ValueError
         Stages that do not fit together; the message names one that would.
     """
@@ -188,7 +188,7 @@ class Pipeline(Stage):
             estimated = _proper(self.estimate(scene, found, rng))
         with stopwatch(seconds, "refine"):
             refined = _proper(self.refine(scene, estimated)) if estimated.found else estimated
-        if not len(found):  # an estimator that runs its own entries may have matched
+        if not len(found):  # an estimator that runs recipes of its own may have matched
             found = of_most(scene, refined.T)
         return Trace(scene, overlap, found, estimated, refined, seconds)
 

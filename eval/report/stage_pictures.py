@@ -69,7 +69,7 @@ def mask(path: str | os.PathLike[str], trace: Trace, T_true: Array) -> None:
     """Write a PNG of both clouds from above, coloured by the overlap mask and by the true overlap.
 
     A point overlaps when the other cloud, under the true pose, has a point within twice the levels' spacing; it is
-    kept when its probability is above one half. The camera image is shown next to them where there is one.
+    kept when its probability is above one half. The camera image stands beside them where there is one.
     """
     scene, overlap = trace.scene, trace.overlap
     in_source, in_target = true_overlap(scene, T_true)
