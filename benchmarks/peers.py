@@ -174,7 +174,9 @@ def main() -> None:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--data", default="../shared/data/real")
-    parser.add_argument("--starts", type=int, default=3, help="random yaw rotations beside the pair as it is")
+    parser.add_argument(
+        "--starts", type=int, default=3, help="random yaw rotations in addition to the pair as it is"
+    )
     parser.add_argument("--presets", nargs="*", default=["default", "fpfh-ransac-gicp"])
     parser.add_argument("--rows", type=Path, help="one JSON line for each method and pair; resumes from it")
     parser.add_argument("--table", type=Path, help="write the summary as Markdown")

@@ -117,7 +117,7 @@ def parse(table: Mapping[str, Any], *, title: str = "table") -> Recipe:
     names = [slug(line.name) for line in lines]
     double = next((line.name for line in lines if names.count(slug(line.name)) > 1), None)
     if double is not None:
-        raise ValueError(f"two lines are called {double!r}; give each a name of its own")
+        raise ValueError(f"two rows are called {double!r}; give each its own name")
     return Recipe(
         title=content.title or title,
         data=content.data,

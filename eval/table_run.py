@@ -29,7 +29,7 @@ _INDEX = "table.json"
 
 @dataclass(frozen=True, kw_only=True)
 class Index:
-    """What is stored of a table beside its predictions; `lines` are the names of the rows that were run."""
+    """What is stored of a table besides its predictions; `lines` are the names of the rows that were run."""
 
     title: str
     data: str

@@ -58,7 +58,7 @@ def check(pipeline: Pipeline) -> None:
     """
     for slot in SLOTS:
         if not callable(getattr(pipeline, slot)):
-            raise ValueError(f"{slot}: {getattr(pipeline, slot)!r} is no stage; it must be callable")
+            raise ValueError(f"{slot}: {getattr(pipeline, slot)!r} is not a stage; it must be callable")
     check_match(pipeline.match, pipeline.estimate)
     masks = registry.name_of(pipeline.overlap) not in (None, "overlap.none")
     if masks and registry.name_of(pipeline.match) == "match.none":

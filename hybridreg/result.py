@@ -41,6 +41,7 @@ class RegistrationResult:
         coordinates that the user gave. Its rotation is orthogonal with determinant +1. `T_target_source` is another
         name for it.
     verdict : "ok", "doubtful" or "failed"
+        By `confidence`: "ok" from 0.95 on, "failed" below 0.5, "doubtful" in between: the evidence does not decide.
     confidence : float in [0, 1]
         Estimated probability that the pose is right, to `tolerance`.
     reasons : tuple of str

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Makes the pair that ships in hybridreg/data/demo: a MEMS fan against a 64-beam spinning LiDAR.
+"""Generate the pair that ships in hybridreg/data/demo: a MEMS fan against a 64-beam spinning LiDAR.
 
 python -m tools.simulator_demo
 
-The pair that lies there was made by version 1 of the simulator; another version makes another pair.
+The shipped pair was made by version 1 of the simulator; another version makes another pair.
 """
 
 from __future__ import annotations

@@ -91,7 +91,7 @@ class Row:
         row = build(cls, parse_json(text, "not a row of predictions"), "not a row of predictions")
         for name in _MATRICES:
             if getattr(row, name) is not None and matrix(getattr(row, name)) is None:
-                raise ValueError(f"not a row of predictions: {name} is no finite 4x4 matrix")
+                raise ValueError(f"not a row of predictions: {name} is not a finite 4x4 matrix")
         return row
 
     @property

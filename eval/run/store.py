@@ -72,7 +72,7 @@ class Appender:
     Parameters
     ----------
     ids : names of all pairs; with them a file that has all rows is neither locked nor touched
-    seen : what the data's files looked like (`hybridreg.data.dataset.looks_of`), kept beside the configuration
+    seen : what the data's files looked like (`hybridreg.data.dataset.looks_of`), stored with the configuration
 
     Raises
     ------

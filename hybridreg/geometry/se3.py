@@ -126,7 +126,7 @@ def check(T: Any, name: str = "T", tolerance: float = 1e-4) -> Array:
         determinant = float(np.linalg.det(matrix[:3, :3]))
     if not off <= tolerance or determinant < 0:
         raise ValueError(
-            f"{name}: the upper left 3x3 block is no rotation (R R^T is off by {off:.2g}, "
+            f"{name}: the upper left 3x3 block is not a rotation (R R^T is off by {off:.2g}, "
             f"determinant {determinant:.3g}); remove scale or reflection"
         )
     return matrix

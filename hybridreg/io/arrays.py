@@ -113,7 +113,7 @@ def _numbers(values: NDArray[Any]) -> Array:
     with np.errstate(over="ignore", invalid="ignore"):  # beyond float64 is infinite, and refused as such
         numbers = np.array(np.ma.getdata(values), dtype=np.float64, order="C")
     if np.ma.isMaskedArray(values):
-        numbers[np.ma.getmaskarray(values)] = np.nan  # a fill value is no coordinate
+        numbers[np.ma.getmaskarray(values)] = np.nan  # a fill value is not a coordinate
     return numbers
 
 

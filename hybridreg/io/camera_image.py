@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 class CameraImage:
     """A dataclass field that holds a path or pixels, and gives pixels: (H, W, 3) uint8, RGB, or None.
 
-    Most pipelines never look at the image, and decoding it may take longer than they do.
+    Most pipelines never use the image, and decoding it may take longer than they do.
 
     Raises
     ------

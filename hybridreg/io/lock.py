@@ -69,7 +69,7 @@ class Lock:
             self.path.unlink(missing_ok=True)
 
     def renew(self) -> None:
-        """Take the lock anew where somebody deleted its file.
+        """Take the lock again where its file was deleted.
 
         Raises
         ------
@@ -149,7 +149,7 @@ def folder_lock(folder: str | os.PathLike[str], part: str = "") -> Lock:
 
 
 def file_lock(file: str | os.PathLike[str]) -> Lock:
-    """The lock of a single file; it lies beside it."""
+    """The lock of a single file, next to it."""
     path = Path(file)
     return Lock(path.with_name(f".{path.name}{_NAME}"), os.fspath(file))
 
@@ -167,7 +167,7 @@ if hasattr(os, "register_at_fork"):
 
 
 def _flock(handle: int) -> bool:
-    # False where there are no locks; BlockingIOError where somebody else holds it.
+    # False where there are no locks; BlockingIOError where another process holds it.
     if fcntl is None:
         return False
     try:
@@ -190,5 +190,5 @@ def _told(handle: int) -> Owner | None:
     try:
         os.lseek(handle, 0, os.SEEK_SET)
         return Owner.parse(os.read(handle, 4096))
-    except OSError:  # Windows and some shares let nobody read what is locked
+    except OSError:  # Windows and some shares do not let a locked file be read
         return None

@@ -50,7 +50,7 @@ class Owner:
             os.kill(self.pid, 0)
         except ProcessLookupError:
             return True
-        except OSError:  # somebody else's process
+        except OSError:  # another user's process
             return False
         return bool(self.start) and start_of(self.pid) != self.start
 

@@ -125,7 +125,7 @@ def _named_rows(rows: Any) -> Any:
 
 def _refuse_mesh(x: Any, name: str) -> None:
     if hasattr(x, "geometry") and callable(getattr(x, "to_mesh", None)):
-        _refuse(x, name, "a scene is no cloud; sample its surfaces: x.to_mesh().sample(100_000)")
+        _refuse(x, name, "a scene is not a cloud; sample its surfaces: x.to_mesh().sample(100_000)")
     if not any(hasattr(x, each) for each in ("triangles", "triangle", "faces")) or _has_no_faces(x):
         return
     sample = "sample_points_uniformly" if hasattr(x, "sample_points_uniformly") else "sample"
@@ -137,7 +137,7 @@ def _refuse_mesh(x: Any, name: str) -> None:
         else "x.points"
     )
     how = f"sample its surface, x.{sample}(100_000)" if hasattr(x, sample) else "sample its surface"
-    _refuse(x, name, f"a mesh is no cloud; {how}, or pass its vertices, {where}, where they lie densely")
+    _refuse(x, name, f"a mesh is not a cloud; {how}, or pass its vertices, {where}, where they lie densely")
 
 
 def _has_no_faces(x: Any) -> bool:
@@ -149,7 +149,7 @@ def _has_no_faces(x: Any) -> bool:
 
 def _as_array(x: Any, name: str) -> NDArray[Any]:
     if isinstance(x, (bytes, bytearray)):
-        _refuse(x, name, "bytes tell no type; pass numpy.frombuffer(x, dtype).reshape(-1, 3)")
+        _refuse(x, name, "bytes have no type; pass numpy.frombuffer(x, dtype).reshape(-1, 3)")
     array = np.ma.asarray(x) if np.ma.isMaskedArray(x) else np.asarray(x)
     if array.ndim == 0 and array.dtype.kind in "OUS":
         read = callable(getattr(x, "read", None))

@@ -75,7 +75,7 @@ def slot_of(stage: Any) -> str:
 
 def check_parameters(stage: Any, slot: str) -> None:
     """A misspelled keyword is refused at once."""
-    assert slot in SLOTS, f"{slot!r} is no slot; the slots are {', '.join(SLOTS)}"
+    assert slot in SLOTS, f"{slot!r} is not a slot; the slots are {', '.join(SLOTS)}"
     try:
         type(stage)(this_is_no_parameter=1)
     except TypeError:

@@ -249,7 +249,7 @@ class NetworkConfig:
 
     def __post_init__(self) -> None:
         if (self.omp or self.vgam) and self.image is None:
-            raise ValueError("omp and vgam look at image tokens: give an ImageConfig")
+            raise ValueError("omp and vgam use image tokens: give an ImageConfig")
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values that `from_dict` and JSON take back."""

@@ -155,7 +155,7 @@ class FcgfNetwork(Pretrained):
             config = named_config(size) if isinstance(size, str) else size
         elif normalize is None:
             raise ValueError(
-                f"the checkpoint {os.fspath(path)!r} does not tell whether its features were normalised in training; "
+                f"the checkpoint {os.fspath(path)!r} does not say whether its features were normalised in training; "
                 "say normalize=True or normalize=False (the table of FCGF's README has it)"
             )
         else:

@@ -62,7 +62,7 @@ class OmnetConfig:
     fusion: tuple[int, ...] = (1024, 1024, 512)
     decoder: tuple[int, ...] = (512, 256, 256)
     regression: tuple[int, ...] = (2048, 1024, 512, 256)
-    iterations: int = 4  # each with weights of its own
+    iterations: int = 4  # each with its own weights
     mask_delay: int = 2  # iterations that see every point; later ones see the mask of the iteration before
     points: int = 717  # of each cloud that the stage uses
     normalize_eps: float = 1e-12  # least length of a quaternion before it is divided by it

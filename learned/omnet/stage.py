@@ -64,7 +64,7 @@ class OmNet(NetworkStage):
             centres=(levels[0].centre, levels[1].centre),
             device=self.device,
         )
-        require_bytes(network.memory(batch), (points, points), self.device, "look at fewer with points=...")
+        require_bytes(network.memory(batch), (points, points), self.device, "use fewer with points=...")
         with torch.inference_mode():
             found = array(network(batch).transform)[0]
         if not np.isfinite(found).all():

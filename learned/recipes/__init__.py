@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Training recipes by name: TOML files beside this one."""
+"""Training recipes by name: TOML files next to this one."""
 
 from __future__ import annotations
 

@@ -21,7 +21,7 @@ class Source:
     data : text for ``hybridreg.data.open_dataset``
     name : how phases and tables refer to it; the data's own text if empty
     weight : share of the samples that come from here, relative to the other sources
-    pairs : use only so many, the first ones; 0 for all
+    pairs : use only the first ones, up to this number; 0 for all
     prepared : prepare all pairs once and store them on disk; false generates and prepares them when needed
     """
 

@@ -154,7 +154,7 @@ def test_poses_of_a_file(tmp_path: Path) -> None:
         ("", "holds no pose"),
         ("1 0 0 0 0 1 0 0 0 0 1 0\n1 0 0\n", "line 2: has 3 numbers, not 12"),
         ("1 0 0 0 0 one 0 0 0 0 1 0\n", "line 1: is not all numbers"),
-        ("9 0 0 0 0 1 0 0 0 0 1 0\n", "line 1: the upper left 3x3 block is no rotation"),
+        ("9 0 0 0 0 1 0 0 0 0 1 0\n", "line 1: the upper left 3x3 block is not a rotation"),
         ("1 0 0 nan 0 1 0 0 0 0 1 0\n", "line 1: the matrix is not finite"),
     ],
 )

@@ -24,7 +24,7 @@ from hybridreg.testing import sample_pair
 from tools.hostile.damage import Damage, damaged, damages
 from tools.hostile.mutate import Change, changed, changes
 
-# What stands in a file of a folder that a table was run in, and in one of its data.
+# Contents of a file in a table's folder, and of one in its data.
 FILES = ("predictions/still.jsonl", "table.json", "data/pair-1/meta.json")
 
 

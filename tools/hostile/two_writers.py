@@ -76,7 +76,7 @@ def _met(pair: Sequence[subprocess.Popen[str]]) -> None:
 
 
 def overwrite_is_refused(root: Path, out: str, workers: int) -> None:
-    """``--overwrite`` beside a running batch is refused, and costs that one nothing; `out` must not be there yet.
+    """``--overwrite`` during a running batch is refused, without affecting that one; `out` must not be there yet.
 
     Raises
     ------
@@ -111,7 +111,7 @@ def _begun(root: Path, out: str, workers: int, *, overwrite: bool) -> subprocess
 
 
 def _ended(process: subprocess.Popen[str], seconds: float) -> str:
-    # What it said on stderr; killed with its workers where it takes longer.
+    # Its stderr; killed with its workers where it takes longer.
     try:
         return process.communicate(timeout=seconds)[1]
     except subprocess.TimeoutExpired:

@@ -78,7 +78,7 @@ def _checked(path: Path) -> bytes:
         raise fault(
             name,
             problem,
-            f"make it smaller: {_MOST_PIXELS / 1e6:.0f} are read, networks look at less than one",
+            f"make it smaller: {_MOST_PIXELS / 1e6:.0f} are read, networks use less than one",
         )
     return data
 

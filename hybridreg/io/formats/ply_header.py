@@ -110,6 +110,6 @@ def _property(words: list[str], name: str) -> Property:
     is_list = types[:1] == ["list"]
     codes = [_TYPES.get(word, "") for word in types[is_list:]]
     if len(codes) != 1 + is_list or "" in codes or (is_list and codes[0].startswith("f")):
-        problem = f"its header line {shorten(' '.join(words))} is no property of a known type"
+        problem = f"its header line {shorten(' '.join(words))} is not a property of a known type"
         raise fault(name, problem, f"known types are {', '.join(_TYPES)}")
     return Property(name=label, code=codes[-1], length_code=codes[0] if is_list else "")

@@ -151,7 +151,7 @@ def test_a_published_checkpoint_is_a_stage(trained: str, tmp_path: Path) -> None
 def test_what_does_not_fit_is_refused(trained: str, monkeypatch: pytest.MonkeyPatch) -> None:
     scene, _ = testing.sample_scene()
     monkeypatch.setattr(memory_estimate, "available_bytes", lambda device: 10**6)
-    with pytest.raises(ValueError, match="256 target and 256 source points.*look at fewer with points="):
+    with pytest.raises(ValueError, match="256 target and 256 source points.*use fewer with points="):
         hr.OmNet(weights=trained)(scene, Correspondences.none(), np.random.default_rng(0))
 
 
