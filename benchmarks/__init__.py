@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: MIT
-"""Ratios against peers, each measured in one run."""
+"""Ratios to other libraries, each measured in one run."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Run the benchmarks that hold the library against its peers: `python -m benchmarks --data FOLDER`."""
+"""Run the benchmarks that compare the library with others: `python -m benchmarks --data FOLDER`."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import argparse
 import subprocess
 import sys
 
-# Each in a process of its own, so that none measures what another left in memory.
+# Each in its own process, so that none measures what another left in memory.
 AGAINST_PEERS = ("voxel", "nearest", "ransac", "peers")
 
 

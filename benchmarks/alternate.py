@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Time rivals in turn, so that a slow minute of the machine hits all of them alike."""
+"""Time competing methods alternately, so that a slow minute of the machine affects all of them alike."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ from hybridreg.pair import LabelledPair
 
 @dataclass
 class Timed:
-    """Best wall time of a rival in seconds, and what it returned."""
+    """Best wall time of a method in seconds, and its result."""
 
     seconds: float
     result: Any
 
 
 def race(rivals: dict[str, Callable[[], Any]], rounds: int = 5) -> dict[str, Timed]:
-    """Let every rival run `rounds` times, one after the other, after a turn that warms up caches and imports.
+    """Let every method run `rounds` times, one after the other, after a round that warms up caches and imports.
 
-    The best time of each counts: on a machine that others use, it says most about the work itself.
+    The best time of each counts: on a shared machine it is the best measure of the work itself.
     """
     timed = {name: Timed(float("inf"), run()) for name, run in rivals.items()}
     for _ in range(rounds):

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: MIT
-"""Seconds of a registration on a busy machine, against the share of it that is fair; beside another checkout's.
+"""Seconds of a registration on a busy machine, compared with its fair share, and with another checkout's.
 
-Each preset runs alone, with one and with three neighbours that never rest, on one core that it shares with one of them,
-and four times at once beside one. The neighbours tell what a thread that never rests gets of a core in those very
-seconds, whoever else uses the machine; for one that runs alone, this process finds out just before and after. A
-registration that gets as much takes its work divided by that: the fair share. Its work is the least processor time that
-any build took alone. The builds take turns, in processes that have warmed up.
+Each preset runs alone, beside one and three busy processes, on one core that it shares with one of them, and four
+times at once beside one. The busy processes measure what an always-running thread gets of a core in the same seconds,
+whoever else uses the machine; for a preset that runs alone, this process measures it just before and after. A
+registration that gets as much takes its work divided by that: the fair share. Its work is the least processor time
+that any build took alone. The builds alternate, in processes that have warmed up.
 
     python -m benchmarks.contention --data ../shared/data/real --before ../an/older/checkout
 
@@ -45,7 +45,7 @@ for _ in sys.stdin:
 
 
 class Situation(NamedTuple):
-    """Registrations at once, neighbours beside them, and whether all share one core."""
+    """Simultaneous registrations, busy processes beside them, and whether all share one core."""
 
     name: str
     at_once: int = 1
@@ -64,8 +64,8 @@ SITUATIONS = (
 
 @dataclass
 class Took:
-    """Of a build: wall and processor seconds of each round's slowest registration, and the neighbours' share of a
-    core in that time."""
+    """Result of a build: wall and processor seconds of each round's slowest registration, and the busy processes'
+    share of a core in that time."""
 
     wall: list[float]
     processor: list[float]
@@ -74,7 +74,7 @@ class Took:
 
 @contextmanager
 def process(command: Sequence[str], folder: Path, one_core: bool) -> Iterator[subprocess.Popen[str]]:
-    """A child with its modules from `folder`, ended with the block."""
+    """A child process with modules from `folder`, ended with the block."""
     variables = {name: value for name, value in os.environ.items() if not name.endswith("_NUM_THREADS")}
     pin: Callable[[], None] | None = (
         (lambda: os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})) if one_core else None
@@ -98,7 +98,7 @@ def process(command: Sequence[str], folder: Path, one_core: bool) -> Iterator[su
 def measure(
     situation: Situation, task: Sequence[str], builds: dict[str, Path], rounds: int
 ) -> dict[str, Took]:
-    """Both builds in turn, with neighbours only while one of them runs."""
+    """Both builds alternately, with busy processes only while one of them runs."""
     took = {name: Took([], [], []) for name in builds}
     with ExitStack() as stack:
         warm = {
@@ -121,13 +121,13 @@ def measure(
 
 
 def one_round(situation: Situation, children: Sequence[subprocess.Popen[str]], took: Took) -> None:
-    """Let the children register once, all at a time."""
+    """Let the children register once, all at the same time."""
     busy = [sys.executable, "-c", "while True: pass"]
     with ExitStack() as stack:
         neighbours = [
             stack.enter_context(process(busy, ROOT, situation.one_core)) for _ in range(situation.neighbours)
         ]
-        time.sleep(0.5)  # they start, and threads that spun for a while after the last round rest
+        time.sleep(0.5)  # let them start, and threads that still spin after the last round stop
         ours = [] if neighbours else [own_share()]
         began, spent = time.perf_counter(), on_core(neighbours)
         for child in children:
@@ -144,7 +144,7 @@ def one_round(situation: Situation, children: Sequence[subprocess.Popen[str]], t
 
 
 def own_share(seconds: float = 0.5) -> float:
-    """What this process gets of a core if it does not rest: the share while nobody of ours runs."""
+    """The share of a core that an always-running thread of this process gets while nothing of ours runs."""
     began, spent = time.perf_counter(), time.thread_time()
     while time.perf_counter() - began < seconds:
         pass
@@ -169,7 +169,7 @@ def main() -> int:
     parser.add_argument("--data", default="../shared/data/real", help="a folder of pairs")
     parser.add_argument("--pair", default="hdl32-small-gicp")
     parser.add_argument("--presets", nargs="+", default=["default", "cross3dreg"])
-    parser.add_argument("--before", type=Path, help="another checkout, to take turns with this one")
+    parser.add_argument("--before", type=Path, help="another checkout, to alternate with this one")
     parser.add_argument("--rounds", type=int, default=3)
     parser.add_argument("--limit", type=float, default=2.0, help="times the fair share")
     options = parser.parse_args()

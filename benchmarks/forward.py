@@ -4,8 +4,8 @@
 The pair is real where the data folder is there: the two clouds are cropped about the sensor until a 0.25 m
 grid holds the wanted number of points. Seconds are the median of the repeats, wall and processor; the
 multiply-adds
-are counted from the tensors' shapes, and the floor is their time at the speed of one large matrix product
-on the same threads, measured in the same run. Peak memory is the process's, so run one size a process.
+are counted from the tensors' shapes, and the lower bound is their time at the speed of one large matrix product on the
+same threads, measured in the same run. Peak memory is the process's, so run one size a process.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ ROOT = Path(__file__).resolve().parents[1]
 
 
 def real_cloud(name: str) -> torch.Tensor:
-    """One cloud (N, 3) of the real pair, or of a made-up street where the data is absent."""
+    """One cloud (N, 3) of the real pair, or of a synthetic street where the data is absent."""
     places = [
         Path(os.environ.get("HYBRIDREG_DATA", "")),
         ROOT / "../shared/data/real",

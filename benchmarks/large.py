@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Time and memory of the preset `default` on ever larger clouds, its voxel grid and its verdict apart.
+"""Time and memory of the preset `default` on increasingly large clouds, with its voxel grid and verdict separately.
 
 A real pair is made denser by copies of its points with a little noise, so that the scene and the points after the grid
-stay what they were: what grows then grows with the points. Each size runs in a process of its own. Processor seconds
+stay the same: what grows, grows with the points. Each size runs in a process of its own. Processor seconds
 do not count what else the machine does; wall seconds do.
 
     python -m benchmarks.large --data ../shared/data/real --points 1000000 20000000
@@ -35,7 +35,7 @@ _NOISE = 0.02  # metres, about a LiDAR's own
 
 
 def denser(points: Array, n: int, seed: int) -> Array:
-    """`n` points: drawn from the cloud, each shaken by a LiDAR's noise where it is a copy."""
+    """`n` points: sampled from the cloud, copies with a LiDAR's noise."""
     rng = np.random.default_rng(seed)
     if n <= len(points):
         return points[np.sort(rng.choice(len(points), n, replace=False))]
@@ -44,7 +44,7 @@ def denser(points: Array, n: int, seed: int) -> Array:
 
 
 def timed(work: Callable[[], Any]) -> tuple[Any, float, float]:
-    """What the work returns, its processor seconds and its wall seconds."""
+    """The result of the work, its processor seconds and its wall seconds."""
     wall, processor = time.perf_counter(), time.process_time()
     made = work()
     return made, time.process_time() - processor, time.perf_counter() - wall
@@ -56,7 +56,7 @@ def measure(data: str, name: str, n: int) -> dict[str, Any]:
     clouds = [
         denser(cloud.points, n, k) for k, cloud in enumerate((labelled.pair.source, labelled.pair.target))
     ]
-    Pipeline.preset("default").run(labelled.pair)  # imports are not what is measured
+    Pipeline.preset("default").run(labelled.pair)  # imports are not measured
     pair, gate, gate_wall = timed(lambda: Pair.of(*clouds, id=name))
     scene, grid, grid_wall = timed(lambda: VoxelGrid()(pair))
     _, after, _ = timed(lambda: Pipeline.preset("default").run(scene.pair))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Multiply-adds of a forward pass, counted from the shapes that the layers really see."""
+"""Multiply-adds of a forward pass, counted from the actual shapes in the layers."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Mutual nearest neighbours among FPFH descriptors: our blocks of a matrix product beside four libraries.
+"""Mutual nearest neighbours among FPFH descriptors: our blocked matrix product compared with four libraries.
 
 A ratio below 1 means that ours is faster. "agree" is the share of a peer's mutual matches that ours has too;
 equal descriptors, and float32, make it less than 1.

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Presets beside the plain wheels, on the same pairs in one run.
+"""Presets compared with other libraries with their documented defaults, on the same pairs in one run.
 
-The peers are called as their own documentation shows, with none of this library's code between: KISS-Matcher then
+The other libraries are called as their documentation shows, without any of this library's code: KISS-Matcher then
 small_gicp at 0.3 and 0.5 m, and Open3D's FPFH + RANSAC then small_gicp at 0.5 m.
 
     python -m benchmarks.peers --data ../shared/data/real --starts 3
@@ -114,7 +114,7 @@ class Outcome:
 
 
 def read(rows: Path | None) -> list[Outcome]:
-    """What an earlier run wrote; nothing where it wrote nothing."""
+    """The results of an earlier run; empty where there are none."""
     if rows is None or not rows.exists():
         return []
     return [Outcome(**json.loads(line)) for line in rows.read_text().splitlines()]
@@ -123,7 +123,7 @@ def read(rows: Path | None) -> list[Outcome]:
 def race(
     pairs: Iterable[LabelledPair], methods: dict[str, Method], done: Iterable[Outcome] = ()
 ) -> Iterator[Outcome]:
-    """Run every method on a pair before the next, so that a slow minute of the machine hits all alike."""
+    """Run every method on a pair before the next pair, so that a slow minute of the machine affects all alike."""
     known = {(outcome.method, outcome.pair) for outcome in done}
     for labelled in pairs:
         for name, method in methods.items():
@@ -162,7 +162,7 @@ def report(outcomes: list[Outcome], data: str, starts: int) -> str:
     """The summary with a caption that says what was run."""
     n = len({o.pair for o in outcomes})
     caption = (
-        f"{n} runs: the pairs in `{data}` as they are and under {starts} random yaw starts. "
+        f"{n} runs: the pairs in `{data}` as they are and under {starts} random yaw rotations. "
         "Success is 2 deg and 0.5 m; seconds are medians of one run on one machine, the ratio one over the pairs that "
         "the peer solves too."
     )
@@ -174,7 +174,9 @@ def main() -> None:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--data", default="../shared/data/real")
-    parser.add_argument("--starts", type=int, default=3, help="random yaw starts beside the pair as it is")
+    parser.add_argument(
+        "--starts", type=int, default=3, help="random yaw rotations in addition to the pair as it is"
+    )
     parser.add_argument("--presets", nargs="*", default=["default", "fpfh-ransac-gicp"])
     parser.add_argument("--rows", type=Path, help="one JSON line for each method and pair; resumes from it")
     parser.add_argument("--table", type=Path, help="write the summary as Markdown")

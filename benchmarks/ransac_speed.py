@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: MIT
-"""Our RANSAC beside Open3D's, on the same matches of each real pair with the same settings.
+"""Our RANSAC compared with Open3D's, on the same matches of each real pair with the same settings.
 
 Both get the same FPFH matches, distance, edge ratio 0.9 and number of iterations; both drop samples whose own
 matches disagree with their pose (Open3D's distance checker). Open3D runs once as its users call it, on the
 downsampled clouds (not at confidence 1, where that took minutes a run), and once on clouds that hold the matches
-alone, which spares it moving the rest. A ratio below 1 means that ours is faster. "err" is the error of the pose
-found, as information.
+alone, which saves it moving the rest. A ratio below 1 means that ours is faster. "err" is the error of the pose found,
+for information.
 
     python -m benchmarks.ransac_speed --data ../shared/data/real --pairs kitti-odo-5-to-0
 """

@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: MIT
-"""How do methods do where one sensor sees but its immediate surroundings?
+"""Results of methods where one sensor sees only its immediate surroundings, by the extent of its cloud.
 
     hybridreg table default.toml --data "sim:val/mid#100" --starts 0 --out runs/val-mid
     python -m benchmarks.reach runs/val-mid --data "sim:val/mid#100"
 
-A cloud's reach is the distance from its middle within which nine tenths of its points lie; a pair's is that of the
-cloud with the shorter one. A narrow sensor a few metres before a wall or a hedge reaches a few metres, and shows hardly
-more than one surface of a place that the other sensor sees whole.
+A cloud's extent is the distance from its middle within which nine tenths of its points lie; a pair's is the shorter of
+the two. A narrow sensor a few metres in front of a wall or a hedge gives a cloud of a few metres, with hardly more
+than one surface of a place that the other sensor sees completely.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ BORDERS = (0.0, 6.0, 12.0, 25.0, np.inf)
 
 
 def outcomes(folder: Path, data: str) -> list[tuple[float, bool, bool]]:
-    """Of each pair: reach in metres, whether its pose is right, and whether it was called ok."""
+    """For each pair: extent in metres, whether its pose is right, and whether it was called ok."""
     clouds = {labelled.pair.id: labelled.pair for labelled in open_dataset(data)}
     return [
         (min(reach(cloud.radii) for cloud in (pair.source, pair.target)), is_right(row), row.verdict == "ok")
@@ -36,9 +36,9 @@ def outcomes(folder: Path, data: str) -> list[tuple[float, bool, bool]]:
 
 
 def table(found: list[tuple[float, bool, bool]]) -> str:
-    """Markdown: pairs, right poses, and right ones that were called ok, for each class of reach."""
+    """Markdown: pairs, right poses, and right ones that were called ok, for each class of extent."""
     metres, right, ok = (np.array(column) for column in zip(*found, strict=True))
-    lines = ["| reach, m | pairs | right | right and ok |", "|---|---|---|---|"]
+    lines = ["| extent, m | pairs | right | right and ok |", "|---|---|---|---|"]
     for low, high in pairwise(BORDERS):
         here = (metres >= low) & (metres < high)
         name = f"{low:.0f} to {high:.0f}" if np.isfinite(high) else f"beyond {low:.0f}"

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""RoITr's position codes, fused against code by code as published: ``python -m benchmarks.roitr_codes``.
+"""RoITr's position codes, fused compared with unfused as published: ``python -m benchmarks.roitr_codes``.
 
-Both are timed in turn on the same level, layer by layer of the published network, with the same weights. The floor is
-the time of the multiply-adds at the speed of one large matrix product, measured in the same run. The pair is real where
-the data folder is there.
+Both are timed alternately on the same level, layer by layer of the published network, with the same weights. The floor
+is the time of the multiply-adds at the speed of one large matrix product, measured in the same run. The pair is real
+where the data folder is there.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ def multiply_adds(points: int, neighbors: int, dim: int, heads: int, *, fused: b
 def alternate(
     block: LocalBlock, features: Tensor, rows: Tensor, ppf: Tensor, repeats: int
 ) -> tuple[float, float, float]:
-    """Median seconds of the block with fused codes and without, taken in turn, and the largest relative difference."""
+    """Median seconds of the block with and without fused codes, alternately, and the largest relative difference."""
     seconds: dict[bool, list[float]] = {True: [], False: []}
     results: dict[bool, Tensor] = {}
     for _ in range(repeats + 1):
@@ -54,7 +54,7 @@ def alternate(
 
 @torch.inference_mode()
 def whole(network: RoitrNetwork, batch: object, repeats: int) -> dict[bool, float]:
-    """Median seconds of encoding a pair, fused and not, in turn."""
+    """Median seconds of encoding a pair, fused and unfused, alternately."""
     seconds: dict[bool, list[float]] = {True: [], False: []}
     layers = [module for module in network.modules() if isinstance(module, LocalAttention)]
     for _ in range(repeats + 1):
@@ -80,7 +80,7 @@ def report(config: RoitrConfig, points: int, repeats: int) -> None:
     for level, encoder in enumerate(network.backbone.encoder):
         rows, dim = batch.source.neighbors[level], config.widths[level]
         features = torch.randn(len(rows), dim)
-        fast, slow, apart = alternate(encoder.blocks[0], features, rows, ppf.within[level], repeats)  # type: ignore[index]
+        fast, slow, apart = alternate(encoder.blocks[0], features, rows, ppf.within[level], repeats)  # type:
         shape = (*rows.shape, config.inner[level], config.heads)
         (new, rest), (old, _) = (multiply_adds(*shape, fused=fused) for fused in (True, False))
         shares = f"{new / (new + rest):13.0%} {old / (old + rest):7.0%}"

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: MIT
-"""Full simulated pairs a second (scene, two scans, photograph, overlap) and what one costs.
+"""Full simulated pairs a second (scene, two scans, camera image, overlap) and what one costs.
 
 python -m benchmarks.simulator_speed [--pairs 30] [--workers 1 2]
 
-Each worker first draws a few pairs that do not count: importing and filling the pools of trees and cars happens
-once, while a training run draws thousands. Pairs a second hang on what else the machine does, CPU seconds a pair
-much less so; the load average is printed so that a reader can tell.
+Each worker first generates a few pairs that do not count: importing and filling the pools of trees and cars happens
+once, while a training run generates thousands. Pairs a second depend on what else the machine does, CPU seconds a pair
+much less so; the load average is printed for that reason.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ def cost(index: int) -> float:
 
 
 def warm_up(worker: int) -> int:
-    """Fills a worker's pools; slow enough that no worker takes another one's share."""
+    """Fill a worker's pools; slow enough that no worker takes another one's share."""
     for index in range(WARM_UP):
         cost(1000 * (worker + 1) + index)
     return os.getpid()

@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: MIT
-"""Forward pass of full FCGF beside its floor: ``python -m benchmarks.sparse_conv_speed --points 6000 --threads 1``.
+"""Forward pass of full FCGF compared with a lower bound: ``python -m benchmarks.sparse_conv_speed --points 6000
+--threads 1``.
 
-The floor is what large matrix products take for the same multiply-adds on the same threads. They run before and after
-every pass, so that a busy machine slows both: the ratio is the median over the repeats, of processor time. The pair is
-real where the data folder is there, cropped about the sensor; where the network's grid holds fewer voxels than wanted,
-the clouds are enlarged until it does. Memory is the process's, so run one size a process.
+The lower bound is the time of large matrix products with the same multiply-adds on the same threads. They run before
+and after every pass, so that a busy machine slows both: the ratio of processor times is the median over the repeats.
+The pair is real where the data folder is there, cropped about the sensor; where the network's grid holds fewer voxels
+than wanted, the clouds are enlarged until it does. Memory is the process's, so run one size a process.
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ _GROWTH = 1.05
 
 
 def cloud_of(name: str, n_voxels: int, config: FcgfConfig) -> torch.Tensor:
-    """The nearest part of a cloud, one point a voxel, with just so many voxels."""
+    """The nearest part of a cloud, one point a voxel, with exactly this many voxels."""
     points = real_cloud(name)
     while len(rows := quantise(points, config.voxel)[0]) < n_voxels:
         points = points * _GROWTH
@@ -36,7 +37,7 @@ def cloud_of(name: str, n_voxels: int, config: FcgfConfig) -> torch.Tensor:
 
 
 def multiply_adds(network: FcgfNetwork, batch: FcgfBatch) -> int:
-    """Of all sparse convolutions in a forward pass: one for each pair of voxels that really meet."""
+    """Of all sparse convolutions in a forward pass: one for each pair of connected voxels."""
     counted = []
 
     def count(layer: SparseConv, args: tuple, out: torch.Tensor) -> None:  # type: ignore[type-arg]

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Pairs a second that training takes on this machine: one process on the CPU, one and several on a graphics card.
+"""Pairs a second that training takes on this machine: one process on the CPU, one and several on a GPU.
 
 ``python -m benchmarks.training_speed --processes 1,4`` trains the recipe `warm-up` with each and reads its
-log. What is prepared is kept in ``--cache``.
+log. Prepared pairs are stored in ``--cache``.
 """
 
 from __future__ import annotations
@@ -16,7 +16,9 @@ from tempfile import TemporaryDirectory
 import torch
 import typer
 
-_STEPS, _BATCH, _PAIRS = 30, 8, 40
+_STEPS = 30  # optimiser steps, by hand
+_BATCH = 8  # pairs a step, by hand
+_PAIRS = 40  # of each tier, by hand
 _RECIPE = """
 base = "warm-up"
 every = 0

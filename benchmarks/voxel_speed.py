@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Our voxel grid beside Open3D's, on both clouds of each real pair.
+"""Our voxel grid compared with Open3D's, on both clouds of each real pair.
 
-Both take a numpy array and give one; Open3D is timed with its conversion from numpy and without. A ratio below
+Both take a numpy array and return one; Open3D is timed with its conversion from numpy and without. A ratio below
 1 means that ours is faster.
 
     python -m benchmarks.voxel_speed --data ../shared/data/real
@@ -23,7 +23,7 @@ Array = NDArray[np.float64]
 
 
 def compare(points: Array, voxel: float) -> dict[str, float]:
-    """Seconds of each way to thin one cloud."""
+    """Seconds of each method for one cloud."""
     o3d = load_open3d()
     points = points.copy()  # Open3D refuses read-only arrays
     ready = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(points))

@@ -1,1 +1,2 @@
 # SPDX-License-Identifier: MIT
+"""Stages without training: matching, pose estimation and refinement, one file each."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Which matches can be right together: a rigid motion keeps the distances between points."""
+"""Compatibility of matches: a rigid motion preserves the distances between points."""
 
 from __future__ import annotations
 
@@ -15,15 +15,16 @@ Rows = NDArray[np.int64]
 
 _BLOCK_VALUES = 1 << 22
 _EPS = 1e-6
-# As torch.allclose has them, by which the published iteration stops.
-_RELATIVE, _ABSOLUTE = 1e-5, 1e-8
+# The published iteration stops by torch.allclose.
+_RELATIVE = 1e-5  # its rtol
+_ABSOLUTE = 1e-8  # its atol; no unit
 
 
 class Seeds(NamedTuple):
-    """Matches about which sets are gathered."""
+    """Matches around which sets are collected."""
 
     rows: Rows  # (S,) best first
-    is_peak: NDArray[np.bool_]  # (K,) whose confidence no match near by exceeds
+    is_peak: NDArray[np.bool_]  # (K,) whose confidence no match nearby exceeds
 
 
 def first_order(source: Array, target: Array, reach: float) -> Floats:
@@ -36,9 +37,9 @@ def first_order(source: Array, target: Array, reach: float) -> Floats:
 
 
 def leading_eigenvectors(matrices: Floats, iterations: int) -> tuple[Floats, int]:
-    """Power iteration from ones: (B, k, k) to (B, k) of length one, and how many multiplications it took.
+    """Power iteration from ones: (B, k, k) to (B, k) of length one, and the number of multiplications.
 
-    It stops for all of the batch at once, when none changes any more (module/HCF_module.py,
+    It stops for the whole batch at once, when none changes any more (module/HCF_module.py,
     cal_leading_eigenvector).
     """
     vectors = np.ones((*matrices.shape[:2], 1), dtype=np.float32)
@@ -51,9 +52,10 @@ def leading_eigenvectors(matrices: Floats, iterations: int) -> tuple[Floats, int
 
 
 def pick_seeds(source: Array, confidence: Floats, radius: float, count: int) -> Seeds:
-    """The ``count`` most confident peaks among matches (K,), apart by ``radius`` metres in the source (K, 3).
+    """The ``count`` most confident peaks among matches (K,), ``radius`` metres apart in the source (K, 3).
 
-    Equals are all peaks. Where there are fewer peaks than asked for, other matches fill up in their order.
+    Matches of equal confidence are all peaks. Where there are fewer peaks than requested, other matches follow in
+    order.
     """
     peak = np.ones(len(source), dtype=bool)
     for rows in _blocks(len(source)):
@@ -64,9 +66,9 @@ def pick_seeds(source: Array, confidence: Floats, radius: float, count: int) -> 
 
 
 def second_order(soft: Floats, seeds: Rows) -> Floats:
-    """How many matches agree with both a seed (S,) and each match: (S, K) whole numbers; 0 where these two do not.
+    """Number of matches compatible with both a seed (S,) and each match: (S, K) integers; 0 where these two are not.
 
-    Agreement with both is asked for at half the reach of ``soft`` (K, K), agreement of the two at all of it
+    Compatibility with both is required at half the tolerance of ``soft`` (K, K), that of the two at the full tolerance
     (Chen et al., CVPR 2022, equation 5, in VRHCF's form with two thresholds).
     """
     at_half = np.float32(0.75)  # 1 - (1/2)^2

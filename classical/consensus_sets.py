@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A set of matches about each seed, halved until it is small, and the pose that it gives (HCF)."""
+"""A set of matches around each seed, halved until it is small, and the pose that it gives (HCF)."""
 
 from __future__ import annotations
 
@@ -15,21 +15,21 @@ Array = NDArray[np.float64]
 
 _EPS = 1e-6
 _CHUNK_VALUES = 1 << 22
-# Matches of a set where there are fewer than the wanted number in all; such sets are not halved.
+# Size of a set where there are fewer matches in all than wanted; such sets are not halved.
 _SMALL = 4
 
 
 class Filtered(NamedTuple):
-    """Sets after one halving, and by how many members' agreement each member was chosen."""
+    """Sets after one halving, and the number of compatible members by which each member was chosen."""
 
     sets: Rows  # (S, k)
     scores: NDArray[np.int64]  # (S, k)
 
 
 def first_sets(agreement: Floats, size: int) -> Rows:
-    """The ``size`` matches (S, size) that agree best with each seed, from (S, K); 4 where there are not so many."""
+    """The ``size`` matches (S, size) most compatible with each seed, from (S, K); 4 where there are fewer."""
     size = size if agreement.shape[1] >= size else min(_SMALL, agreement.shape[1])
-    # Whole numbers sort by counting; of equals the first.
+    # Integers sort by counting; the first of equals comes first.
     short = agreement.max(initial=0.0) < np.iinfo(np.int16).max
     return np.argsort((-agreement).astype(np.int16 if short else np.int32), axis=1, kind="stable")[:, :size]
 
@@ -37,8 +37,8 @@ def first_sets(agreement: Floats, size: int) -> Rows:
 def filter_sets(soft: Floats, sets: Rows, share: float, final: int) -> list[Filtered]:
     """Halve sets (S, k) until they have at most ``final`` members: 200, 100, 50, 25, 12 as published for 15.
 
-    A member counts by how many members agree with it and with the set's *first* member, which usually is the seed;
-    agreement of the two themselves is not asked for (module/HCF_module.py, corr_filter).
+    A member is ranked by the number of members compatible with it and with the set's *first* member, usually the seed;
+    the two themselves need not be compatible (module/HCF_module.py, corr_filter).
     """
     steps: list[Filtered] = []
     while sets.shape[1] > final and sets.shape[1] > _SMALL:
@@ -63,7 +63,8 @@ def _halved(soft: Floats, sets: Rows, left: int) -> Filtered:
 
 
 def set_weights(soft: Floats, sets: Rows, iterations: int) -> tuple[Floats, int]:
-    """Weights (S, k) of the members, of sum one: the leading eigenvector of their agreement without the diagonal."""
+    """Weights (S, k) of the members with sum one: the leading eigenvector of their compatibility without the
+    diagonal."""
     matrices = soft[sets[:, :, None], sets[:, None, :]].copy()
     diagonal = np.arange(sets.shape[1])
     matrices[:, diagonal, diagonal] = 0.0
@@ -72,5 +73,5 @@ def set_weights(soft: Floats, sets: Rows, iterations: int) -> tuple[Floats, int]
 
 
 def set_poses(source: Array, target: Array, sets: Rows, weights: Floats) -> Array:
-    """Poses (S, 4, 4) by weighted least squares; the identity where a set weighs nothing."""
+    """Poses (S, 4, 4) by weighted least squares; the identity where a set has no weight."""
     return kabsch_batch(source[sets], target[sets], weights.astype(np.float64)).T

@@ -17,26 +17,26 @@ from hybridreg.stage import Stage
 
 Array = NDArray[np.float64]
 
-# Open3D returns the identity without a word where fewer matches pass its tuple test.
+# Open3D silently returns the identity where fewer matches pass its tuple test.
 _FEWEST = 10
 
 
 @dataclass(frozen=True, kw_only=True)
 class Fgr(Stage):
-    """Robust fit to all matches at once: a Geman-McClure cost whose basin narrows step by step.
+    """Robust fit to all matches at once: a Geman-McClure cost whose width shrinks step by step.
 
     Parameters
     ----------
     max_distance : float or None
-        Metres; residuals beyond it count for little at the end. None takes the spacing of the matches, or of the
-        scene where they tell none. (Open3D's own default, 0.025 of the cloud's diameter, is metres on a LiDAR scan.)
+        Metres; residuals beyond it count for little at the end. None takes the spacing of the matches, or of the scene
+        where they have none. (Open3D's own default, 0.025 of the cloud's diameter, is metres on a LiDAR scan.)
     division_factor : float
-        The basin shrinks by this factor every fourth iteration.
+        The width shrinks by this factor every fourth iteration.
     iterations : int
     tuple_scale : float in (0, 1)
-        Three matches are kept where their edges agree in length up to this factor.
+        Three matches are kept where the lengths of their edges agree up to this factor.
     max_tuples : int
-        At most so many such triples are drawn.
+        At most this many such triples are drawn.
     """
 
     max_distance: float | None = None

@@ -19,9 +19,9 @@ from hybridreg.stage import Stage
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
-# In spacings. Five is usual; sparse scans want more to tell one neighbourhood from another.
+# In spacings. Five is usual; sparse scans need more to distinguish neighbourhoods.
 _RADIUS = 8.0
-# An overlap that leaves fewer points than this is taken to be wrong, and ignored.
+# An overlap mask that leaves fewer points than this is considered wrong, and ignored.
 _FEWEST = 100
 # Of a superpoint's cell, in spacings: as coarse as the published networks' superpoints are against their first voxel.
 _CELL = 16.0
@@ -29,18 +29,18 @@ _CELL = 16.0
 
 @dataclass(frozen=True, kw_only=True)
 class Fpfh(Stage):
-    """Pair points whose neighbourhoods look alike.
+    """Match points whose neighbourhoods look alike.
 
     Descriptors are those of Open3D, on normals that point to the sensor; they are compared by the Hellinger
     distance, as histograms should be (Arandjelovic and Zisserman 2012). The defaults were chosen on simulated
-    pairs of different LiDARs, where both the distance and the wide radius make more of the matches right.
+    pairs of different LiDARs, where both the distance and the wide radius increase the inlier ratio.
 
     Parameters
     ----------
     radius : float or None
         Of a neighbourhood, metres. None takes 8 times the scene's spacing.
     max_neighbours : int
-        At most so many points of a neighbourhood are looked at, the nearest ones.
+        At most this many points of a neighbourhood are used, the nearest ones.
     normal_neighbours : int
         Points that a normal is fitted to.
     mutual : bool
@@ -114,7 +114,7 @@ class Fpfh(Stage):
         return scene.shared(key, lambda: _fpfh(level.points, normals, radius, self.max_neighbours))
 
     def _rows(self, scene: Scene, side: Side, features: Array, probability: Array) -> Indices:
-        # A descriptor of zeros belongs to a point without neighbours, and equals all others of its kind.
+        # A descriptor of zeros belongs to a point without neighbours, and equals all others like it.
         described = features.any(axis=1)
         rows = np.flatnonzero(described & (probability > self.min_overlap))
         if len(rows) < min(_FEWEST, int(described.sum())):
@@ -122,7 +122,7 @@ class Fpfh(Stage):
             rows = np.flatnonzero(described)
         if len(rows) > self.max_points:
             scene.note(f"FPFH matched {self.max_points} of the {len(rows)} points of the {side} (max_points)")
-            # The draw hangs on the pair alone, so that a matcher needs no generator.
+            # The sample depends on the pair alone, so that a matcher needs no generator.
             rng = np.random.default_rng(zlib.crc32(f"{scene.pair.id} {side}".encode()))
             rows = np.sort(rng.choice(rows, self.max_points, replace=False))
         return rows

@@ -21,26 +21,28 @@ from hybridreg.stage import Stage
 Array = NDArray[np.float64]
 
 _FEWEST_NEIGHBOURS = 3  # span a plane
-# Steps at which a round ends, and how many times larger they may be in the rounds before the last.
-_STILL_RAD, _STILL_M, _COARSE = 1e-5, 1e-4, 100.0
-# Share of the points that lay on the target before and must do so after.
+# Steps at which a round has converged.
+_STILL_RAD = 1e-5  # radians, by hand
+_STILL_M = 1e-4  # metres, by hand
+_COARSE = 100.0  # factor on both in the rounds before the last, by hand
+# Of the source points that lay on the target before, the share that must still do so afterwards.
 _KEPT = 0.9
-# Points farther from the target than so many times the widest search are left out.
+# Points farther from the target than this multiple of the widest search are left out.
 _FAR = 2.0
 
 
 @dataclass(frozen=True, kw_only=True)
 class Gicp(Stage):
-    """Align the surfaces around the points, coarse to fine.
+    """Align the local surfaces of both clouds, coarse to fine.
 
     Parameters
     ----------
     voxel : float or None
-        Grid on which the clouds are compared, metres; None takes a share of the levels' spacing.
+        Voxel at which the clouds are compared, metres; None takes a share of the levels' spacing.
     fineness : float
         That share. A coarser grid takes less time and is a little less exact.
     max_distances : tuple of float or None
-        Farthest partner in each round, metres; None takes 5, 2.5 and 1.25 spacings.
+        Maximum correspondence distance of each round, metres; None takes 5, 2.5 and 1.25 spacings.
     neighbours : int
         Points from which a surface's covariance is estimated.
     iterations : int
@@ -74,12 +76,13 @@ class Gicp(Stage):
         rests = False
         for distance in distances:
             last = distance == distances[-1]
-            # What rested at once does so a little nearer too. Only the last round needs to rest exactly.
+            # What converged at once also converges at a smaller distance. Only the last round needs to converge
+            # exactly.
             if rests and not last:
                 continue
             still = 1.0 if last else _COARSE
-            # One thread (`hybridreg.runtime.threads`): with more, the order of summation, and so the
-            # last digits, depend on the machine.
+            # One thread (`hybridreg.runtime.threads`): with more, the order of summation, and hence the last digits,
+            # depend on the machine.
             found = small_gicp.align(
                 target,
                 source,
@@ -91,7 +94,7 @@ class Gicp(Stage):
                 translation_epsilon=still * _STILL_M,
                 num_threads=1,
             )
-            # `iterations` (1.0.1) is the number of the last step, from zero, also of steps that ran out.
+            # `iterations` (1.0.1) is the number of the last step, from zero, even where it ran out of steps.
             T, rests = found.T_target_source, found.converged and found.iterations == 0
         return not_worse(scene, pose, np.asarray(T))
 
@@ -99,8 +102,9 @@ class Gicp(Stage):
 def not_worse(scene: Scene, before: Pose, T: Array) -> Pose:
     """The refined pose, unless far fewer source points lie on the target than before (docs/methods.md 9.6).
 
-    small_gicp reports convergence also where it slid away or had no partner left, so the count decides. It may fall
-    a little: a pose that is a degree off can bring more points of sparse rings near one another than the true one.
+    small_gicp reports convergence even where it slid away or had no correspondences left, so the count decides. It may
+    drop a little: a pose that is a degree off can bring more points of sparse rings near one another than the true
+    one.
     """
     if not np.isfinite(T).all():
         return before
@@ -112,9 +116,9 @@ def not_worse(scene: Scene, before: Pose, T: Array) -> Pose:
 
 
 def _within(scene: Scene, T: Array, voxel: float, reach: float) -> Array:
-    # The source's points (n, 3), less those that are no partners. small_gicp looks for the nearest point however far it
-    # is, and the farther it is the longer it takes: a third of the time for a right pose, half a minute for one that
-    # lays most points beside the target.
+    # The source's points (n, 3), without those that have no correspondence. small_gicp searches the nearest point at
+    # any distance, and takes longer the farther it is: a third of the time for a right pose, half a minute for one
+    # that moves most points away from the target.
     points = scene.at(voxel).source.points
     distance, _ = scene.target.tree.query(
         se3.apply(T, points), distance_upper_bound=reach, workers=n_threads()

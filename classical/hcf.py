@@ -27,15 +27,15 @@ Rows = NDArray[np.int64]
 
 @dataclass(frozen=True, kw_only=True)
 class Hcf(Stage):
-    """Sets of matches that keep each other's distances, halved until few are left, give poses; the best is refined.
+    """Sets of mutually compatible matches, halved until few are left, give poses; the best one is refined.
 
-    Nothing is drawn at random. Memory grows with the square of the number of matches (100 MB at 5,000).
+    Deterministic. Memory grows with the square of the number of matches (100 MB at 5,000).
 
     Parameters
     ----------
     max_distance : float or None
         Metres; a match agrees with a pose when its residual is smaller. None takes 1.5 times the spacing of the
-        matches, or of the scene where they tell none. Published: 0.1 indoors, 0.6 on KITTI.
+        matches, or of the scene where they have none. Published: 0.1 indoors, 0.6 on KITTI.
     reach : float or None
         Metres by which distances between two right matches may differ. None: as `max_distance`, as published.
     nms_radius : float or None
@@ -45,11 +45,11 @@ class Hcf(Stage):
         1.2 m whatever was asked for, but 0.1 m where the inlier threshold is exactly 0.1 (module/HCF_module.py,
         post_refinement); 1.2 and 0.1 here reproduce its numbers.
     seed_share : float in (0, 1]
-        Seeds for each match.
+        Number of seeds as a share of the matches.
     set_size : int
-        Matches gathered about a seed. With fewer matches in all, sets of four, which are not halved.
+        Matches collected around a seed. With fewer matches in all, sets of four, which are not halved.
     kept_share : float in (0, 1)
-        Of a set in each halving.
+        Share of a set that each halving keeps.
     final_size : int
         Sets are halved while they are larger. Published: 15, which ends at 12.
     iterations : int
@@ -57,8 +57,8 @@ class Hcf(Stage):
     refine_steps : int
         At most; the refinement ends when the number of agreeing matches repeats.
     max_matches : int
-        Of more matches the heaviest are used, of equals the first; noted in the result. The released code takes the
-        first 8,000, which is the same where all weigh one.
+        Of more matches those with the largest weights are used, of equals the first; noted in the result. The released
+        code takes the first 8,000, which is the same where all weights are one.
     rival_share : float in [0, 1]
         A pose far from the best one is a rival when its support is at least this share of the best one's.
     """
@@ -125,12 +125,12 @@ class Hcf(Stage):
         return set_poses(source, target, sets, weights)
 
     def refined(self, source: Array, target: Array, T: Array, near: float) -> Array:
-        """A pose (4, 4) fitted again and again to the matches within ``near`` metres, near ones weighing more."""
+        """A pose (4, 4) refitted repeatedly to the matches within ``near`` metres, near ones weighing more."""
         steps = self.refinement(source, target, T, near)
         return steps[-1][1] if steps else T
 
     def refinement(self, source: Array, target: Array, T: Array, near: float) -> list[tuple[int, Array]]:
-        """The fits of the refinement in turn: how many matches took part, and the pose (4, 4)."""
+        """Each fit of the refinement: the number of matches used, and the pose (4, 4)."""
         steps: list[tuple[int, Array]] = []
         before = 0
         for _ in range(self.refine_steps):

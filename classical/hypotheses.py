@@ -25,17 +25,17 @@ def draw(n_samples: int, size: int, weight: Array, rng: np.random.Generator) -> 
 
 
 def rigid(samples: Indices, source: Array, target: Array, edge_ratio: float, shortest: float) -> Indices:
-    """Samples whose edges are as long in the source as in the target.
+    """Samples whose edges have the same length in source and target.
 
-    Each edge is looked at in turn and only for the samples that passed those before: nine samples of ten stop
-    at the first, so that a pose is computed for few.
+    Edges are checked one after another, each only for the samples that passed so far: nine samples in ten fail at the
+    first, so that few poses are computed.
 
     Parameters
     ----------
     edge_ratio : float in [0, 1]
         Shorter edge over longer edge must reach this.
     shortest : float
-        Metres; an edge no longer than this says nothing about the rotation. Drops a match drawn twice, too.
+        Metres; an edge no longer than this says nothing about the rotation. This also drops a match drawn twice.
     """
     for i, j in combinations(range(samples.shape[1]), 2):
         one = _square(source[samples[:, i]] - source[samples[:, j]])
@@ -46,7 +46,7 @@ def rigid(samples: Indices, source: Array, target: Array, edge_ratio: float, sho
 
 
 def poses(samples: Indices, source: Array, target: Array, max_distance: float) -> Array:
-    """Poses (b, 4, 4) of the samples whose own matches all agree with the pose that they make."""
+    """Poses (b, 4, 4) of the samples whose matches all agree with the pose fitted to them."""
     p, q = source[samples], target[samples]
     fits = kabsch_batch(p, q)
     residual = np.einsum("bij,bkj->bki", fits.T[:, :3, :3], p) + fits.T[:, None, :3, 3] - q

@@ -19,19 +19,21 @@ from hybridreg.stage import Stage
 Array = NDArray[np.float64]
 
 _FEWEST = 6
-_STILL_RAD, _STILL_M = 1e-6, 1e-5
+# Steps at which a round has converged.
+_STILL_RAD = 1e-6  # radians, by hand
+_STILL_M = 1e-5  # metres, by hand
 
 
 @dataclass(frozen=True, kw_only=True)
 class Icp(Stage):
-    """Move the source onto its nearest target points until it rests.
+    """Move the source onto its nearest target points until convergence.
 
     Parameters
     ----------
     kind : "point" or "plane"
         What is minimised: the distance to the nearest point, or to the plane through it.
     max_distances : tuple of float or None
-        Farthest partner in each round, metres; None takes 5, 2.5 and 1.25 spacings of the levels.
+        Maximum correspondence distance of each round, metres; None takes 5, 2.5 and 1.25 spacings of the levels.
     iterations : int
         At most, in each round.
     """
@@ -75,7 +77,7 @@ class Icp(Stage):
 def plane_step(p: Array, q: Array, normals: Array) -> Array:
     """Gauss-Newton step (6,) on the distances of `p` (N, 3) to the planes at `q` with `normals`.
 
-    Rotation vector in radians about the origin, then translation; directions that the planes leave open stay put.
+    Rotation vector in radians about the origin, then translation; unconstrained directions get no step.
     """
     J = np.hstack([np.cross(p, normals), normals])
     residual = np.sum((p - q) * normals, axis=1)
@@ -84,7 +86,7 @@ def plane_step(p: Array, q: Array, normals: Array) -> Array:
 
 
 def point_step(p: Array, q: Array) -> Array:
-    """Rigid motion that maps `p` (N, 3) onto `q` with least squares, as a twist (6,)."""
+    """Rigid motion that maps `p` (N, 3) onto `q` in the least-squares sense, as a twist (6,)."""
     p_mean, q_mean = p.mean(axis=0), q.mean(axis=0)
     # Rotation that maximises trace(R H): the nearest rotation to the transposed cross-covariance.
     R = se3.project((q - q_mean).T @ (p - p_mean))

@@ -23,8 +23,10 @@ from hybridreg.stage import Stage
 Array = NDArray[np.float64]
 
 # Its C++ code (1.0.2) segfaults on clouds where no point has a neighbourhood to describe. In 1,500 random clouds all
-# 225 crashes had no point with five neighbours within the radius of its normals; twice as much is asked for here.
-_SUPPORTED_POINTS, _NEIGHBOURS, _NORMAL_RADIUS = 10, 6, 3.0
+# 225 crashes had no point with five neighbours within the radius of its normals; twice as much is required here.
+_SUPPORTED_POINTS = 10  # points with a neighbourhood, at least; by hand
+_NEIGHBOURS = 6  # of such a point, itself included
+_NORMAL_RADIUS = 3.0  # voxels; the radius of the wheel's normals
 _FEWEST_MATCHES = 3
 _SMALLEST_VOXEL = 0.01  # metres; below half of it the wheel raises RuntimeError
 _LARGEST_NOISE = 0.999
@@ -34,11 +36,11 @@ _LARGEST_NOISE = 0.999
 class KissMatcher(Stage):
     """Register the whole clouds at one voxel size.
 
-    Which size is right hangs on the pair, and its own count of inliers does not tell on clouds of different sensors:
-    let `Candidates` try several.
+    The right size depends on the pair, and the matcher's own inlier count does not reveal it on clouds of different
+    sensors: let `Candidates` try several.
 
-    Equal calls give equal bits, unless the wheel (1.0.2) matched before in this process, outside of this stage, on
-    more than one core: then 40 calls gave two poses, 0.26 m apart, at a 0.3 m voxel.
+    Equal calls give equal bits, unless the wheel (1.0.2) was used before in this process, outside this stage, on more
+    than one core: then 40 calls gave two poses, 0.26 m apart, at a 0.3 m voxel.
 
     Parameters
     ----------
@@ -47,7 +49,7 @@ class KissMatcher(Stage):
     scale : float
         Voxel in spacings of the levels.
     max_matches : int
-        KISS-Matcher keeps at most so many initial matches.
+        KISS-Matcher keeps at most this many initial matches.
     """
 
     wheels: ClassVar[tuple[str, ...]] = ("kiss_matcher",)
@@ -73,12 +75,12 @@ class KissMatcher(Stage):
 
     def _at(self, scene: Scene, voxel: float) -> Array | None:
         kiss_matcher = _wheel()
-        # Its own voxel grid depends on the order of a race between threads; ours makes the result repeatable.
+        # Its own voxel grid depends on a race between threads; ours makes the result repeatable.
         source = voxel_centroids(scene.pair.source.points, voxel)
         target = voxel_centroids(scene.pair.target.points, voxel)
         if not (_describable(source, voxel) and _describable(target, voxel)):
             return None
-        # What small things are measured in makes no difference to it, but for this limit.
+        # The unit of small scenes makes no difference to it, except for this limit.
         magnified = max(1.0, _SMALLEST_VOXEL / voxel)
         source, target, voxel = magnified * source, magnified * target, magnified * voxel
         # It clamps both noise bounds at a metre, and prints a warning where it does; so clamp before.
@@ -90,12 +92,12 @@ class KissMatcher(Stage):
             solver_noise_bound_gain=min(0.75, _LARGEST_NOISE / voxel),
         )
         matcher = kiss_matcher.KISSMatcher(config)
-        with single():  # its pruning races otherwise, and hangs in a forked process
+        with single():  # otherwise its pruning has a race, and hangs in a forked process
             found_source, found_target = matcher.match(source.T, target.T)
             if len(found_source) < _FEWEST_MATCHES:
                 return None
             solution = matcher.prune_and_solve(found_source, found_target)
-        # `valid` (1.0.2) says that there was something to solve; a pose of fewer inliers is any pose at all.
+        # `valid` (1.0.2) only says that there was something to solve; a pose with fewer inliers is arbitrary.
         if not solution.valid or matcher.get_num_final_inliers() < _FEWEST_MATCHES:
             return None
         T = np.eye(4)
@@ -106,9 +108,9 @@ class KissMatcher(Stage):
 @lru_cache(maxsize=1)
 def _wheel() -> Any:
     kiss_matcher = wheels.load("kiss_matcher", 'estimate="kiss"')
-    # It has threads of two kinds, which race: 1 match in 30 differed from the others. `single` holds OpenMP's. The
-    # others' number it takes from the cores at the first match of a process; where that sees one, all of 600 later ones
-    # were the same (1.0.2, Linux).
+    # It has threads of two kinds, which race: 1 match in 30 differed from the others. `single` limits OpenMP's. It
+    # sets the number of the others from the cores at the first match of a process; where it sees one core, all of 600
+    # later matches were the same (1.0.2, Linux).
     points = np.random.default_rng(0).uniform(size=(3, 300))
     with on_one_core(), single():
         kiss_matcher.KISSMatcher(kiss_matcher.KISSMatcherConfig(0.2, use_voxel_sampling=False)).match(

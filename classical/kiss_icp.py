@@ -16,10 +16,12 @@ from hybridreg.runtime.optional_packages import load
 from hybridreg.scene import Scene
 from hybridreg.stage import Stage
 
-# The map drops points beyond this range; the target is one scan, nothing of it is to be dropped.
+# The map drops points beyond this range; the target is one scan, none of which should be dropped.
 _EVERYTHING = 1e6
-# KISS-ICP's density: `max_points_per_voxel` of its configuration and the two samplings of its pipeline (1.3.0).
-_POINTS_PER_VOXEL, _MAP_SAMPLING, _SOURCE_SAMPLING = 20, 0.5, 1.5
+# KISS-ICP's density (1.3.0).
+_POINTS_PER_VOXEL = 20  # `max_points_per_voxel` of its configuration
+_MAP_SAMPLING = 0.5  # voxels; sampling of its map
+_SOURCE_SAMPLING = 1.5  # voxels; sampling of its source
 _REACH = 3.0  # sigmas
 
 
@@ -27,15 +29,15 @@ _REACH = 3.0  # sigmas
 class KissIcp(Stage):
     """Align the source to a voxel map of the target with a Geman-McClure kernel.
 
-    KISS-ICP looks for a partner in the 27 cells around a point only, so the map's cells are as long as the farthest
-    partner is away, and hold as many more points. The clouds are sampled as KISS-ICP does it: it keeps points, where
-    centroids of two grids would lie 3 to 11 cm beside each other on identical clouds.
+    KISS-ICP searches correspondences only in the 27 cells around a point, so the map's cells are as long as the
+    maximum correspondence distance, and hold more points accordingly. The clouds are sampled as in KISS-ICP, which
+    keeps points: centroids of two grids would differ by 3 to 11 cm on identical clouds.
 
     Parameters
     ----------
     sigma : float or None
-        Scale of the kernel, metres; partners are sought up to three times as far. None takes 2.5 spacings of the
-        levels (KISS-ICP starts at 2 m on vehicle LiDAR).
+        Scale of the kernel, metres; correspondences are searched up to three times as far. None takes 2.5 spacings of
+        the levels (KISS-ICP starts at 2 m on vehicle LiDAR).
     voxel : float or None
         Resolution, metres: KISS-ICP's voxel size, of which it keeps 20 points a cell. None takes 1.25 spacings.
     iterations : int

@@ -15,7 +15,7 @@ from hybridreg.stage import Stage
 
 @dataclass(frozen=True, kw_only=True)
 class NoOverlap(Stage):
-    """Every point counts."""
+    """Every point takes part."""
 
     def __call__(self, scene: Scene) -> Overlap:
         return Overlap.full(len(scene.source), len(scene.target))
@@ -23,7 +23,7 @@ class NoOverlap(Stage):
 
 @dataclass(frozen=True, kw_only=True)
 class NoMatch(Stage):
-    """No matches: for estimators that look at the clouds themselves."""
+    """No matches: for estimators that work on the clouds themselves."""
 
     def __call__(self, scene: Scene, overlap: Overlap) -> Correspondences:
         return Correspondences.none()
@@ -31,7 +31,7 @@ class NoMatch(Stage):
 
 @dataclass(frozen=True, kw_only=True)
 class GivenMatches(Stage):
-    """A place for the caller's own matches, `pipe.run(pair, matches=...)`."""
+    """Placeholder for the caller's own matches, `pipe.run(pair, matches=...)`."""
 
     gives: ClassVar[frozenset[str]] = frozenset({"matches", "group"})
 
@@ -43,7 +43,7 @@ class GivenMatches(Stage):
 
 @dataclass(frozen=True, kw_only=True)
 class Identity(Stage):
-    """The clouds are taken to be aligned already: the start for a refinement, and the row to beat in a table."""
+    """The identity pose: the start of a refinement, and the baseline row of a table."""
 
     def __call__(self, scene: Scene, matches: Correspondences, rng: np.random.Generator) -> Pose:
         return Pose(np.eye(4))
@@ -51,7 +51,7 @@ class Identity(Stage):
 
 @dataclass(frozen=True, kw_only=True)
 class NoRefinement(Stage):
-    """The estimated pose as it is."""
+    """The estimated pose, unchanged."""
 
     def __call__(self, scene: Scene, pose: Pose) -> Pose:
         return pose

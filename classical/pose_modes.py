@@ -10,9 +10,10 @@ from hybridreg.geometry.consensus import Consensus, Support, distances
 
 Array = NDArray[np.float64]
 
-# Poses nearer than both are one answer: 5 degrees, and a few times the distance at which matches agree
-# (2 to 3 m for vehicle LiDAR, decimetres in a room).
-_SAME_DEG, _SAME_DISTANCES = 5.0, 4.0
+# Poses closer than both are one mode.
+_SAME_DEG = 5.0  # degrees, by hand
+# Distances at which matches agree (2 to 3 m for vehicle LiDAR, decimetres in a room); by hand.
+_SAME_DISTANCES = 4.0
 _MOST_MODES = 8
 
 
@@ -24,7 +25,7 @@ def modes(
     Parameters
     ----------
     poses, counts : (B, 4, 4), (B,)
-        Hypotheses and how many matches agree with each.
+        Hypotheses, and the number of matches that agree with each.
     share : float in [0, 1]
         A pose needs this share of the best one's support to be returned.
     """
@@ -40,7 +41,7 @@ def modes(
         )
         near[0] = True
         left = left[~near]
-        # Refitting about doubles a hypothesis's support at most, so half the share is asked for before it.
+        # Refitting at most about doubles a hypothesis's support, so half the share is required before it.
         least = max(least, 0.5 * share * found[-1].n_inliers)
     found.sort(key=lambda one: -one.score)
     return _distinct([one for one in found if one.score >= share * found[0].score], centre, consensus)
@@ -56,6 +57,6 @@ def _distinct(found: list[Support], centre: Array, consensus: Consensus) -> list
 
 
 def same(poses: Array, T: Array, centre: Array, consensus: Consensus) -> NDArray[np.bool_]:
-    """Which of the poses (B, 4, 4) are one answer with T (4, 4), seen at `centre` (3,)."""
+    """Which of the poses (B, 4, 4) belong to one mode with T (4, 4), compared at `centre` (3,)."""
     degrees, metres = distances(poses, T, centre)
     return (degrees < _SAME_DEG) & (metres < _SAME_DISTANCES * consensus.max_distance)

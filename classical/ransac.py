@@ -35,23 +35,23 @@ class Ransac(Stage):
     iterations : int
         Most samples to draw.
     sample_size : int
-        Matches in a sample. Three fix a pose and are likeliest to be all right; the papers' RANSAC-50K has 4.
+        Matches in a sample. Three determine a pose and are most likely to be all correct; the papers' RANSAC-50K has 4.
     max_distance : float or None
         Metres; a match agrees with a pose when its residual is smaller. None takes 1.5 times the spacing
-        of the matches, or of the scene where they tell none.
+        of the matches, or of the scene where they have none.
     edge_ratio : float in [0, 1]
-        The shorter of an edge's two lengths over the longer must reach this. 0 lets all samples through.
+        Least ratio of an edge's shorter to its longer length in the two clouds. 0 accepts all samples.
     confidence : float in [0, 1]
-        Stop when a sample of right matches only has been drawn with this probability, were the best support
-        the true one. 1 draws all samples.
+        Stop when an all-inlier sample has been drawn with this probability, assuming that the best support is the true
+        inlier count. 1 draws all samples.
     local_optimisation : bool
         Refit the best poses to the matches that agree with them.
     max_matches : int
-        More matches are thinned to so many at random, by weight; noted in the result.
+        More matches are sampled down to this number by weight; noted in the result.
     rival_share : float in [0, 1]
         A pose far from the best one is a rival when its support is at least this share of the best one's.
     backend : "own" or "open3d"
-        Open3D's code shares one generator among its threads: its results need not repeat. It finds no rivals.
+        Open3D shares one generator among its threads: results are not repeatable. It finds no rivals.
     """
 
     iterations: int = 50_000
@@ -115,7 +115,7 @@ class Ransac(Stage):
     def _search(self, consensus: Consensus, rng: np.random.Generator) -> list[Array]:
         """Poses, best first."""
         size = min(self.sample_size, len(consensus))
-        # The fit to all matches: right where there are no outliers, or no sample is wider than the noise.
+        # The fit to all matches: correct where there are no outliers, or where no sample is wider than the noise.
         T, status = kabsch(consensus.source, consensus.target, consensus.weight)
         poses, counts = [T[None]], [consensus.counts(T[None])]
         if status != "ok":
@@ -153,7 +153,7 @@ class Ransac(Stage):
         return consensus.refit(support).n_inliers if self.local_optimisation else support.n_inliers
 
     def _wanted(self, inlier_ratio: float, size: int) -> float:
-        # Samples after which one without outliers was drawn with the wanted confidence.
+        # Number of samples after which one without outliers was drawn with the wanted confidence.
         right = inlier_ratio**size
         if self.confidence >= 1.0 or right <= 0.0:
             return self.iterations

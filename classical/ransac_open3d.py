@@ -19,9 +19,9 @@ Array = NDArray[np.float64]
 def ransac_open3d(
     stage: Ransac, source: Array, target: Array, max_distance: float, rng: np.random.Generator
 ) -> Array | None:
-    """Pose (4, 4) from matches (K, 3) to (K, 3), or None where fewer than 3 matches agree with what it found.
+    """Pose (4, 4) from matches (K, 3) to (K, 3), or None where fewer than 3 matches agree with the result.
 
-    The clouds it gets hold the matches only, as it copies and moves the whole source for each pose it tries.
+    It is given only the matched points, as it copies and moves the whole source for each hypothesis.
     """
     o3d = load_open3d()
     registration = o3d.pipelines.registration

@@ -30,7 +30,7 @@ class RandomSample(Stage):
     n_points : int
         Clouds with fewer points are kept whole.
     seed : int
-        With the pair's id it fixes the draw.
+        With the pair's id it fixes the sample.
     """
 
     n_points: int = 10_000

@@ -20,13 +20,13 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, kw_only=True)
 class WeightedSvd(Stage):
-    """The best fit to all matches by their weights, with no defence against wrong ones.
+    """The weighted least-squares fit to all matches, without outlier rejection.
 
     Parameters
     ----------
     max_distance : float or None
         Metres; matches nearer than this under the pose are reported as inliers. None takes 1.5 times the
-        spacing of the matches, or of the scene where they tell none.
+        spacing of the matches, or of the scene where they have none.
     """
 
     max_distance: float | None = None

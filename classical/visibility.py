@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Which points could the other sensor have seen, as far as that can be told before any pose is known?"""
+"""Which points the other sensor could have seen, as far as that is known before any pose."""
 
 from __future__ import annotations
 
@@ -16,31 +16,30 @@ from hybridreg.stage import Stage
 
 Array = NDArray[np.float64]
 
-# Share of a sensor's returns beyond its range or outside its vertical field of view, as here taken: strays.
+# Share of a sensor's returns beyond its range or outside its vertical field of view, as defined here: outliers.
 _STRAYS = 0.01
-# Places tried for the other sensor: rings of equal area, golden-angle turns, so that few cover the disc evenly.
+# Positions tried for the other sensor: rings of equal area at golden angles, so that few cover the disc evenly.
 _N_PLACES = 24
 _GOLDEN = np.pi * (3.0 - np.sqrt(5.0))
 
 
 @dataclass(frozen=True, kw_only=True)
 class Visibility(Stage):
-    """Probability that the other sensor, somewhere within `baseline` of this one, reaches a point.
+    """Probability that the other sensor, somewhere within `baseline` of this one, can see a point.
 
-    For each point: the share of the places where the other sensor may have stood from which the point lies within
-    that sensor's range and, where both clouds show a ground, within its vertical field of view, at its own height
+    For each point: the share of the possible positions of the other sensor from which the point lies within that
+    sensor's range and, where both clouds show a ground, within its vertical field of view, at its own height
     over the ground. The range is that of its farthest returns, the field of view that of its range image about the
-    normal of its own ground, so that a sensor may hang upside down or tilted.
+    normal of its own ground, so that a sensor may be mounted upside down or tilted.
 
-    What it cannot tell, and does not pretend to: which way the other sensor faced (a narrow fan thins no
-    direction of a full circle; the probability is that of a point which the fan is turned to), and what stood in
-    the way. A cloud without a viewpoint, or with several, says nothing
-    about what its sensor could see, and the other cloud's points all count.
+    It does not know which way the other sensor faced (a narrow field of view excludes no direction; the probability is
+    that of a point inside it), nor what was occluded. A cloud without a viewpoint, or with several, says nothing about
+    what its sensor could see, so all points of the other cloud take part.
 
     Parameters
     ----------
     baseline : float or None
-        How far apart the sensors may have stood, metres. None takes half of the shorter of the clouds' reaches
+        How far apart the sensors may have stood, metres. None takes half the shorter of the clouds' extents
         (`hybridreg.geometry.extent.reach`).
     """
 
@@ -61,7 +60,7 @@ def _reached(scene: Scene, side: Side, baseline: float) -> Array:
     other: Side = "target" if side == "source" else "source"
     level = scene.level(side)
     image: RangeImage | RangeImages | None = getattr(scene.pair, other).range_image
-    # Sensors at several places together see nearly everything about them.
+    # Sensors at several positions together see nearly everything around them.
     if not isinstance(image, RangeImage) or level.viewpoint is None or level.viewpoint.ndim > 1:
         return np.ones(len(level))
     farthest = float(np.quantile(image.ranges, 1.0 - _STRAYS))
@@ -73,8 +72,8 @@ def _reached(scene: Scene, side: Side, baseline: float) -> Array:
 
 
 def _within_range(ray: Array, farthest: float, baseline: float) -> Array:
-    # Without a vertical the disc may lie in any plane; the share is that of a place somewhere on the line through
-    # the point, which depends on the distance alone.
+    # Without a vertical the disc may lie in any plane; the share is that of positions along the line through the
+    # point, which depends on the distance alone.
     distance = np.linalg.norm(ray, axis=1)
     return np.clip((farthest + baseline - distance) / max(2.0 * baseline, 1e-9), 0.0, 1.0)
 

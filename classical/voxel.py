@@ -5,11 +5,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import partial
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from hybridreg.cloud import PointCloud
 from hybridreg.geometry.voxel_cells import voxel_centroids
 from hybridreg.pair import Pair
 from hybridreg.resolution import comparable, default_voxel
@@ -19,7 +21,7 @@ from hybridreg.thinning import thinned
 
 Array = NDArray[np.float64]
 
-# Where the shorter of two reaches gives so small a voxel that the other cloud keeps more points, no method gains by
+# Where the shorter of two extents gives so small a voxel that the other cloud keeps more points, no method gains by
 # them, and all take longer.
 _MOST_POINTS = 30_000
 
@@ -31,9 +33,9 @@ class VoxelGrid(Stage):
     Parameters
     ----------
     voxel : float or None
-        Edge of a cell, metres. None derives one length for both clouds from how far they reach
-        (`hybridreg.resolution.default_voxel`), a longer one where a cloud would keep more than 30,000 points of its
-        own otherwise, and notes it in the result. A cloud of more than a million and a half points is first thinned to
+        Edge of a cell, metres. None derives one length for both clouds from their extents
+        (`hybridreg.resolution.default_voxel`), a longer one where a cloud would otherwise keep more than 30,000
+        points, and notes it in the result. A cloud of more than a million and a half points is first thinned to
         cells of a quarter of that (`hybridreg.thinning`).
     density : "keep" or "match"
         "match" gives each cloud the voxel at which both have about as many points per occupied volume; for a
@@ -66,35 +68,37 @@ class VoxelGrid(Stage):
             return _each_by_itself(pair)
         voxel = self.voxel or default_voxel(pair.source, pair.target)
         reached = voxel
-        points = [voxel_centroids(cloud.points, voxel) for cloud in clouds]
+        points = [_cells(cloud, voxel) for cloud in clouds]
         at = [voxel, voxel]
         while self.voxel is None and (most := max(map(len, points))) > _MOST_POINTS:
             voxel = _two_digits_up(voxel * (most / _MOST_POINTS) ** 0.5)
             for k, cloud in enumerate(clouds):
                 if len(points[k]) > _MOST_POINTS:
-                    points[k], at[k] = voxel_centroids(cloud.points, voxel), voxel
+                    points[k], at[k] = _cells(cloud, voxel), voxel
         for k, cloud in enumerate(clouds):  # one of few points follows when the voxel is found
             if at[k] != voxel:
-                points[k] = voxel_centroids(cloud.points, voxel)
+                points[k] = _cells(cloud, voxel)
         spacing = [voxel, voxel]
         if self.density == "match":
             dense = int(np.argmax([len(p) for p in points]))
             points[dense], spacing[dense] = _thin(clouds[dense].points, voxel, len(points[1 - dense]))
         source, target = (
-            Level(points=p, spacing=s, viewpoint=c.viewpoint)
+            c.once(
+                ("level", s, len(p)), partial(Level, points=p, spacing=s, viewpoint=c.viewpoint)
+            )  # no other grid of one spacing has as many cells
             for p, s, c in zip(points, spacing, clouds, strict=True)
         )
         scene = Scene(pair=pair, source=source, target=target)
         if self.voxel is None:
             scene.note(
-                f"voxel {voxel:.3g} m, derived from the clouds' reach"
+                f"voxel {voxel:.3g} m, derived from the clouds' extent"
                 + (f" ({reached:.3g} m) and the number of points" if voxel > reached else "")
             )
         return scene
 
 
 def _each_by_itself(pair: Pair) -> Scene:
-    # One length for a cloud in millimetres and one in metres would leave nothing of the second.
+    # One length for a cloud in millimetres and one in metres would reduce the second to nothing.
     levels = []
     for cloud in (pair.source, pair.target):
         voxel = default_voxel(pair.source, pair.target)
@@ -105,8 +109,14 @@ def _each_by_itself(pair: Pair) -> Scene:
         levels.append(Level(points=points, spacing=voxel, viewpoint=cloud.viewpoint))
     source, target = levels
     scene = Scene(pair=pair, source=source, target=target)
-    scene.note(f"voxels {source.spacing:.3g} and {target.spacing:.3g} m: the clouds' reaches are so unlike")
+    scene.note(
+        f"voxels {source.spacing:.3g} and {target.spacing:.3g} m: the clouds' extents differ too much for one"
+    )
     return scene
+
+
+def _cells(cloud: PointCloud, voxel: float) -> Array:
+    return cloud.once(("cells", voxel), partial(voxel_centroids, cloud.points, voxel))
 
 
 def _two_digits_up(length: float) -> float:
@@ -115,7 +125,7 @@ def _two_digits_up(length: float) -> float:
 
 
 def _thin(points: Array, voxel: float, n_wanted: int) -> tuple[Array, float]:
-    # Bisection on the voxel: the count falls monotonically enough for twelve halvings to meet it within a percent.
+    # Bisection on the voxel: the count is monotonic enough for twelve halvings to reach it within a percent.
     low, high = voxel, 16.0 * voxel
     for _ in range(12):
         middle = np.sqrt(low * high)

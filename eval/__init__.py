@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""One evaluator for every pipeline: predict once, score as often as wanted."""
+"""One evaluator for every pipeline: predict once, score as often as needed."""
 
 from hybridreg.eval.run.prediction import predict
 from hybridreg.eval.run.row import Row

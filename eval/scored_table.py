@@ -70,7 +70,7 @@ class Table:
             e.name for e in self.methods if any(OWN_GRID in note for row in e.rows for note in row.notes)
         ]
         told = "What the downsample slot chose did not reach the networks of"
-        return [f"{told} {', '.join(names)}: each {OWN_GRID}"] if names else []
+        return [f"{told} {'; '.join(names)}: each {OWN_GRID}"] if names else []
 
     @property
     def methods(self) -> list[Entry]:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A table as a TOML file: the data, the protocols, a base pipeline, and what each line changes in it."""
+"""A table as a TOML file: the data, the protocols, a base pipeline, and what each row changes in it."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from hybridreg.pipeline import Pipeline
 
 Changes = Mapping[str, Any]
 
-# What makes a line a control: a pipeline that knows more, or sees less, than a method does.
+# Keys that make a row a control: a pipeline that knows more, or sees less, than a method does.
 _CONTROLS = ("oracle", "image")
 
 
@@ -51,7 +51,7 @@ class _Content:
 
 @dataclass(frozen=True, kw_only=True)
 class Line:
-    """One line of a table: a method, or why the stages asked for do not fit together."""
+    """One row of a table: a method, or why its stages do not fit together."""
 
     name: str
     method: Method | Control | None
@@ -65,7 +65,7 @@ class Recipe:
     Attributes
     ----------
     starts : how often each pair is repeated with its source under a random yaw
-    paper : figures that somebody printed, to be shown apart
+    paper : published figures, shown separately
     """
 
     title: str
@@ -90,10 +90,9 @@ def read(path: str | os.PathLike[str]) -> Recipe:
     FileNotFoundError
         No such file.
     KeyError, ValueError
-        Not TOML, a key that means nothing, a value of the wrong kind, a name that nobody registered, two lines of one
-        name.
+        Not TOML, an unknown key, a value of the wrong type, an unregistered name, or two rows with one name.
     """
-    # A checkout has a folder `classical` where the table of that name may be asked for.
+    # A checkout has a folder `classical`, which is also the name of a table.
     if os.fspath(path) in known() and not Path(path).is_file():
         text = _shipped().joinpath(f"{os.fspath(path)}.toml").read_text(encoding="utf-8")
         table = parse_toml(text, os.fspath(path))
@@ -118,7 +117,7 @@ def parse(table: Mapping[str, Any], *, title: str = "table") -> Recipe:
     names = [slug(line.name) for line in lines]
     double = next((line.name for line in lines if names.count(slug(line.name)) > 1), None)
     if double is not None:
-        raise ValueError(f"two lines are called {double!r}; give each a name of its own")
+        raise ValueError(f"two rows are called {double!r}; give each its own name")
     return Recipe(
         title=content.title or title,
         data=content.data,
@@ -131,12 +130,12 @@ def parse(table: Mapping[str, Any], *, title: str = "table") -> Recipe:
 
 
 def slug(name: str) -> str:
-    """A name as a file may be called."""
+    """A name made safe for a file name."""
     return re.sub(r"[^a-z0-9.]+", "-", name.lower()).strip("-.") or "row"
 
 
 def title_of(changed: Mapping[str, Any]) -> str:
-    """Name of a line that has none of its own: what it changes."""
+    """Name of a row without one: what it changes."""
     parts = []
     for key, value in changed.items():
         if isinstance(value, Mapping):
@@ -167,7 +166,7 @@ def _rows(base: Changes, rows: Sequence[Changes]) -> Iterator[Line]:
 
 
 def _grid(base: Changes, sweep: Changes) -> Iterator[Line]:
-    # Every combination of the axes; one that does not fit stays in the table, with the reason.
+    # Every combination of the axes; one that does not fit stays in the table with the reason.
     axes = dict(_axes(sweep))
     if not axes:
         return
@@ -186,7 +185,7 @@ def _build(changed: Mapping[str, Any]) -> Pipeline | Control:
     pipeline = changes.build({key: value for key, value in changed.items() if key not in _CONTROLS})
     oracle, image = changed.get("oracle", ""), changed.get("image", True)
     if oracle not in ("", "overlap"):
-        raise ValueError(f"oracle = {oracle!r}: only 'overlap' can be told from the truth")
+        raise ValueError(f"oracle = {oracle!r}: only 'overlap' can be taken from the ground truth")
     if not isinstance(image, bool):
         raise ValueError(f"image = {image!r}: expected true or false")
     if image and not oracle:

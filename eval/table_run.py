@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A table: several methods on the same pairs, run once and kept in a folder."""
+"""A table: several methods on the same pairs, run once and stored in a folder."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ _INDEX = "table.json"
 
 @dataclass(frozen=True, kw_only=True)
 class Index:
-    """What is noted of a table beside its predictions; `lines` are the names of those that were run."""
+    """What is stored of a table besides its predictions; `lines` are the names of the rows that were run."""
 
     title: str
     data: str
@@ -48,7 +48,7 @@ class Index:
 
 @dataclass(frozen=True, kw_only=True)
 class _MadeFrom:
-    """The data that stored rows are of."""
+    """The data that stored rows belong to."""
 
     name: str
     pairs: int
@@ -57,7 +57,7 @@ class _MadeFrom:
 
 @dataclass(frozen=True, kw_only=True)
 class _Made:
-    """What must agree between files of predictions that stand in one table."""
+    """What must agree between files of predictions in one table."""
 
     data: _MadeFrom
     seed: int
@@ -73,11 +73,11 @@ def run(
     overwrite: bool = False,
     on_row: Callable[[str, Row], None] | None = None,
 ) -> Table:
-    """Run every line of a recipe; what `out` already holds is not run again.
+    """Run every row of a table file; what `out` already holds is not run again.
 
     Parameters
     ----------
-    pairs : the data without the yaw starts that the recipe asks for
+    pairs : the data without the yaw rotations that the file asks for
     out : folder; the rows go to `out/predictions/<line>.jsonl`
     on_row : called with each line's name and row
 
@@ -202,14 +202,14 @@ def of_files(paths: Sequence[str | os.PathLike[str]]) -> Table:
 
 
 def read_index(folder: str | os.PathLike[str]) -> Index:
-    """What `run` noted of a table.
+    """What `run` stored of a table.
 
     Raises
     ------
     FileNotFoundError
         No table was run there.
     ValueError
-        The note is damaged.
+        The file is damaged.
     """
     path = Path(folder) / _INDEX
     if not path.is_file():

@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from hybridreg.classical.overhead.birdseye import BirdsEye
     from hybridreg.classical.overhead.relief_search import ReliefSearch
     from hybridreg.classical.ransac import Ransac
+    from hybridreg.classical.ransac_50k import Ransac50k
     from hybridreg.classical.sampling import AllPoints, RandomSample
     from hybridreg.classical.svd import WeightedSvd
     from hybridreg.classical.visibility import Visibility
@@ -46,6 +47,9 @@ if TYPE_CHECKING:
     from hybridreg.learned.stages.omp import Omp
     from hybridreg.learned.stages.vgam import Vgam
     from hybridreg.learned.vrhcf.stage import Vrhcf
+    from hybridreg.many.alignment import Alignment
+    from hybridreg.many.register_all import register_all
+    from hybridreg.many.target import Target
     from hybridreg.matches import Correspondences, Overlap, Pose
     from hybridreg.pair import LabelledPair, Pair
     from hybridreg.pipeline import Pipeline, Trace
@@ -66,6 +70,7 @@ _WHERE = {
     "hybridreg.classical.kiss_icp": ["KissIcp"],
     "hybridreg.classical.nothing": ["GivenMatches", "Identity", "NoMatch", "NoOverlap", "NoRefinement"],
     "hybridreg.classical.ransac": ["Ransac"],
+    "hybridreg.classical.ransac_50k": ["Ransac50k"],
     "hybridreg.classical.overhead.relief_search": ["ReliefSearch"],
     "hybridreg.classical.sampling": ["AllPoints", "RandomSample"],
     "hybridreg.classical.svd": ["WeightedSvd"],
@@ -83,6 +88,9 @@ _WHERE = {
     "hybridreg.learned.stages.omp": ["Omp"],
     "hybridreg.learned.stages.vgam": ["Vgam"],
     "hybridreg.learned.vrhcf.stage": ["Vrhcf"],
+    "hybridreg.many.alignment": ["Alignment"],
+    "hybridreg.many.register_all": ["register_all"],
+    "hybridreg.many.target": ["Target"],
     "hybridreg.matches": ["Correspondences", "Overlap", "Pose"],
     "hybridreg.pair": ["LabelledPair", "Pair"],
     "hybridreg.pipeline": ["Pipeline", "Trace"],

@@ -68,31 +68,31 @@ def register(
     crop: Any = None,
     scale: bool = False,
 ) -> RegistrationResult:
-    """Align two point clouds with the default recipe, or with a preset of another name.
+    """Align two point clouds with the preset `default`, or with another preset.
 
     Parameters
     ----------
     source, target : path, array, table, tensor or object that holds points (`PointCloud.of`), in any mix
         Metres. The source moves, the target stays.
     image : path, (H, W[, C]) array or None
-        A photograph of the common view; no calibration. Stages that know no image ignore it.
+        A camera image of the common view; no calibration. Stages that use no image ignore it.
     voxel : float or None
-        Metres; None derives it from how far the clouds reach.
+        Metres; None derives it from the clouds' extents.
     seed : int
         Fixes every random choice.
     nonfinite : "raise" or "drop"
-        What to do with points that are missing: not finite, masked, or (dropped, else warned of) at the very origin
-        where many are; the count dropped stands in the result's notes.
+        What to do with missing points: not finite, masked, or, where many are, exactly at the origin (dropped, or
+        reported by a warning); the number dropped is in the result's notes.
     source_viewpoint, target_viewpoint : "auto", "none", (3,), (N, 3), or ((k, 3), (N,))
-        Where each sensor stood, in the coordinates of its points; see `PointCloud.of`. Say it for maps, merged clouds
-        and vehicle frames: it lets free space speak.
+        Where each sensor stood, in the coordinates of its points; see `PointCloud.of`. Give it for maps, merged clouds
+        and vehicle frames: without it free space cannot be tested.
     init : (4, 4), path of such a matrix, or None
         A rough pose, source to target; searched around first.
     max_translation, max_rotation : float or None
         Metres that the middle of the source may lie away from where `init` (or nothing) puts it; degrees that the pose
         may turn away from it. Poses beyond are neither found nor rivals.
     gravity : "known", "unknown", "up", (3,), or ((3,), (3,))
-        "unknown" where one cloud may be turned over; else a pose that turns the world upside down is never "ok". "up"
+        "unknown" where one cloud may be upside down; else a pose that turns the world upside down is never "ok". "up"
         where z points up in both clouds; a vector where another axis does (one for both, or the source's and the
         target's).
     crop : float, six numbers, mapping, or None
@@ -109,7 +109,7 @@ def register(
     Raises
     ------
     ValueError
-        For input that no pose can be computed from, naming the cloud, the number and the cure.
+        For input that no pose can be computed from; the message names the cloud, the number and a cure.
     FileNotFoundError
         For a path that does not exist.
     KeyError

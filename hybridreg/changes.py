@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What changes in a pipeline, written down: a line of a table file, or `--set` on the command line."""
+"""Changes to a pipeline as text: a line of a table file, or `--set` on the command line."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ KEYS = ("preset", "pipeline", "voxel", "prior", *SLOTS)
 
 
 def build(changes: Mapping[str, Any]) -> Pipeline:
-    """Pipeline of a preset (or a pipeline's file) and what differs from it.
+    """Pipeline from a preset (or a pipeline file) and the changes to it.
 
     Parameters
     ----------
@@ -35,7 +35,7 @@ def build(changes: Mapping[str, Any]) -> Pipeline:
     """
     unknown = set(changes) - set(KEYS)
     if unknown:
-        raise ValueError(f"{', '.join(sorted(unknown))}: unknown; a pipeline is told by {', '.join(KEYS)}")
+        raise ValueError(f"{', '.join(sorted(unknown))}: unknown; a pipeline is given by {', '.join(KEYS)}")
     if "preset" in changes and "pipeline" in changes:
         raise ValueError(
             f"preset={changes['preset']!r} and pipeline={changes['pipeline']!r}: leave one of them out"
@@ -54,7 +54,7 @@ def build(changes: Mapping[str, Any]) -> Pipeline:
 
 
 def apply(pipeline: Pipeline, changes: Mapping[str, Any]) -> Pipeline:
-    """The pipeline with some slots filled anew, or some fields of a slot's stage changed."""
+    """The pipeline with other stages in some slots, or other fields of a slot's stage."""
     slots: dict[str, Any] = {}
     for slot, change in changes.items():
         if slot == "prior":

@@ -4,9 +4,10 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Callable, Hashable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, Literal
+from typing import Any, Literal, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +20,7 @@ from hybridreg.io import read_recorded, read_viewpoint
 from hybridreg.io.recorded.recording import ANY, Recorded, Selection
 
 Array = NDArray[np.float64]
+Value = TypeVar("Value")
 
 # Coordinates above this are a map grid's, not a sensor's: 10 km leaves float32 code 1 mm of resolution.
 _MAP_GRID = 1e4
@@ -31,17 +33,19 @@ class PointCloud:
     Attributes
     ----------
     points : (N, 3) float64, read-only
-        Coordinates with `offset` taken off.
+        Coordinates minus `offset`.
     sensor : str
         Free text, for reports.
     offset : (3,) float64
-        Whole kilometres taken off the coordinates that the user gave; zero for a cloud in its sensor's frame.
+        Whole kilometres subtracted from the user's coordinates; zero for a cloud in its sensor's frame.
     dropped : int
-        Points left out on request: not finite, or no returns.
+        Points dropped on request: not finite, or missing returns.
     said : Seen or None
-        Where it was seen from, as a caller or a data set says; None puts a place to the test.
+        Where it was seen from, as a caller or a data set says; None has `guess` tested.
     guess : (3,) float64 or None
-        The place that is tested then: what the file names, or the frame's origin.
+        The viewpoint to test: the one in the file, or the frame's origin.
+    kept : dict or None
+        Of a prepared target (`hybridreg.many.target`), what `once` keeps for the next registration.
     """
 
     points: Array
@@ -50,6 +54,7 @@ class PointCloud:
     dropped: int = 0
     said: Seen | None = None
     guess: Array | None = None
+    kept: dict[Hashable, Any] | None = field(default=None, repr=False)
 
     @classmethod
     def of(
@@ -62,33 +67,34 @@ class PointCloud:
         viewpoint: Given = "auto",
         select: Selection = ANY,
     ) -> PointCloud:
-        """Check and convert anything that holds points: the one gate of the library.
+        """Check and convert anything that holds points: the library's only entrance for clouds.
 
         Parameters
         ----------
         x : path, array, table or object that holds points
             Arrays and tensors (N, 3+), (3 to 6, N) or (H, W, 3+); records, tables and dictionaries with x, y and z by
-            name; ROS' PointCloud2, laspy's and Open3D's clouds, and whatever else keeps `points`
-            (`hybridreg.io.point_objects`). Metres, unless a name tells another unit, as `X (mm)`. What is masked or
-            missing is not finite.
+            name; ROS's PointCloud2, clouds of laspy and Open3D, and whatever else has `points`
+            (`hybridreg.io.point_objects`). Metres, unless a name gives another unit, as in `X (mm)`. Masked or missing
+            values count as not finite.
         name : str
             What error messages call the cloud.
         nonfinite : "raise" or "drop"
-            What to do with points that are not finite. "drop" also leaves out what drivers write where nothing came
-            back, the very origin, where that is 1 % of the points or more; "raise" warns of it.
+            What to do with points that are not finite. "drop" also drops points exactly at the origin, which drivers
+            write for missing returns, where they are 1 % of the points or more; "raise" warns of them.
         viewpoint : "auto", "none", (3,), (N, 3), or ((k, 3), (N,))
             Where the sensor stood, in the coordinates of the points: one place, one for each point, or places and the
-            row of each point's. "none" is honest for a map, a CAD model or a merged cloud whose sensors are not known:
-            free space is not tested then. "auto" takes what the file says, or tests whether a sensor may have stood
-            at the origin (`hybridreg.geometry.viewpoint`).
+            row of each point's. "none" is right for a map, a CAD model or a merged cloud whose viewpoints are unknown:
+            free space is then not tested. "auto" takes the viewpoint in the file, or tests whether a sensor may have
+            stood at the origin (`hybridreg.geometry.viewpoint`).
         select : Selection
             Which cloud of a file that holds several: of a bag, an E57 file.
 
         Raises
         ------
         ValueError
-            Naming the cloud, the number that is wrong and the cure.
+            Naming the cloud, the number that is wrong and a cure.
         """
+        x = getattr(x, "prepared", x)
         if isinstance(x, PointCloud):
             gate.check(x.points, name)
             said = given(viewpoint, len(x), name)
@@ -106,7 +112,7 @@ class PointCloud:
             words = "as its file says" if len(recorded.places) else "a surface, which no sensor saw"
             said = Seen(recorded.places, recorded.of_point, words)
         offset = _whole_kilometres(kept)
-        points = kept - offset if offset.any() else kept  # a copy of the caller's already
+        points = kept - offset if offset.any() else kept  # already a copy of the caller's
         gate.check(points, name)
         points.setflags(write=False)
         return cls(
@@ -117,6 +123,19 @@ class PointCloud:
             said=None if said is None else said.of(rows).less(offset),
             guess=None if place is None else place - offset,
         )
+
+    def once(self, key: Hashable, make: Callable[[], Value]) -> Value:
+        """`make()`; of a prepared target what it gave the first time."""
+        if self.kept is None:
+            return make()
+        if key not in self.kept:
+            self.kept[key] = make()
+        value: Value = self.kept[key]
+        return value
+
+    def __getstate__(self) -> dict[str, Any]:
+        # What is found out again need not travel between processes.
+        return {**self.__dict__, "kept": None if self.kept is None else {}}
 
     def __len__(self) -> int:
         return len(self.points)
@@ -133,18 +152,19 @@ class PointCloud:
 
     @cached_property
     def seen(self) -> Seen:
-        """Where the cloud was seen from, and how that is known: as said, or as the test of the origin tells."""
+        """Where the cloud was seen from, and how that is known: as given, or from the test of the origin."""
         return found(self.points, self.guess) if self.said is None else self.said
 
     @property
     def viewpoint(self) -> Array | None:
-        """Where the sensor stood: (3,), (k, 3) of several places, or None where it is not known; `offset` taken off."""
+        """Where the sensor stood: (3,), (k, 3) for several viewpoints, or None where it is not known; minus
+        `offset`."""
         places = self.seen.places
         return None if len(places) == 0 else places[0] if len(places) == 1 else places
 
     @cached_property
     def range_image(self) -> RangeImage | RangeImages | None:
-        """What the sensor saw in each direction; None where its place is not known."""
+        """What the sensor saw in each direction; None where its viewpoint is not known."""
         places, of_point, _ = self.seen
         if len(places) == 0:
             return None
@@ -154,8 +174,8 @@ class PointCloud:
 
 
 def _whole_kilometres(points: Array) -> Array:
-    # Whole kilometres, so that a cloud moved to a map grid by a round number comes back to the very coordinates
-    # it had, its sensor at the origin again. The median, because a stray return may lie anywhere.
+    # Whole kilometres, so that a cloud moved to a map grid by a round number gets back exactly the coordinates it had,
+    # with its sensor at the origin. The median, because a stray return may lie anywhere.
     if len(points) == 0:
         return np.zeros(3)
     middle = np.median(extent.some(points), axis=0)

@@ -22,17 +22,17 @@ from hybridreg.slots import SLOTS
 if TYPE_CHECKING:
     from hybridreg.pipeline import Pipeline
 
-# No LiDAR reaches this far, and no sensor pair shares a scene this small, in metres.
-_FARTHEST, _SMALLEST = 2_000.0, 0.05
+_FARTHEST = 2_000.0  # metres: no LiDAR reaches farther
+_SMALLEST = 0.05  # metres: no sensor pair shares a smaller scene
 # Cells along one axis beyond which the voxel or the unit is wrong: 1 cm cells over 1 km.
 _MANY_CELLS = 100_000
-# Below this the grid has merged what there was to match.
+# Below this the grid has merged the points that were to be matched.
 _FEW_LEFT = 200
 _FUNCTIONS = (types.FunctionType, types.MethodType, types.BuiltinFunctionType, functools.partial)
 
 
 def with_voxel(downsample: Any, voxel: float | None) -> Any:
-    """The downsampling stage with `Pipeline(voxel=...)` put into it."""
+    """The downsampling stage with the voxel of `Pipeline(voxel=...)`."""
     if voxel is None:
         return downsample
     if isinstance(voxel, bool) or not isinstance(voxel, Real):
@@ -58,7 +58,7 @@ def check(pipeline: Pipeline) -> None:
     """
     for slot in SLOTS:
         if not callable(getattr(pipeline, slot)):
-            raise ValueError(f"{slot}: {getattr(pipeline, slot)!r} is no stage; it must be callable")
+            raise ValueError(f"{slot}: {getattr(pipeline, slot)!r} is not a stage; it must be callable")
     check_match(pipeline.match, pipeline.estimate)
     masks = registry.name_of(pipeline.overlap) not in (None, "overlap.none")
     if masks and registry.name_of(pipeline.match) == "match.none":
@@ -85,25 +85,25 @@ def check_match(match: Any, estimate: Any) -> None:
 
 
 def check_seed(seed: int) -> None:
-    """Refuse what numpy's generators take no seed from."""
+    """Refuse values that numpy's generators do not take as a seed."""
     if isinstance(seed, bool) or not isinstance(seed, Integral) or seed < 0:
         raise ValueError(f"seed={seed!r} must be a whole number, 0 or more")
 
 
 def check_image(pipeline: Pipeline, pair: Pair) -> None:
-    """Refuse a pair without an image where a stage cannot do without."""
+    """Refuse a pair without an image where a stage needs one."""
     for slot in SLOTS:
         check_stage_image(getattr(pipeline, slot), pair)
 
 
 def check_stage_image(stage: Any, pair: Pair) -> None:
-    """Refuse a pair without an image where this stage cannot do without."""
+    """Refuse a pair without an image where this stage needs one."""
     if not pair.has_image and "image" in _words(stage, "needs"):
         raise ValueError(f"pair {pair.id}: {_label(stage)} needs an image; pass image=...")
 
 
 def check_scene(scene: Scene) -> None:
-    """Refuse levels that are too small to register; warn of a unit or a voxel that is evidently wrong."""
+    """Refuse levels that are too small to register; warn of a unit or a voxel that is obviously wrong."""
     doubts = units.doubts(scene.pair)
     for name, text in doubts.items():
         _warn(f"{name}: {text}")
@@ -116,7 +116,7 @@ def check_scene(scene: Scene) -> None:
                 f"{name}: {len(level)} of {len(cloud)} points are left after downsampling to {level.spacing:.3g} m, "
                 f"fewer than {gate.MIN_POINTS}; choose a smaller voxel"
             )
-        if doubts:  # one sentence tells the cloud to blame
+        if doubts:  # one sentence names the cloud at fault
             continue
         low, high = cloud.bounds
         extent = high - low

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""From the coordinates that the user gave to the small ones that the stages see, and back."""
+"""From the user's coordinates to the small ones that the stages see, and back."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 
 
 def raise_pose(T: Array, pair: Pair) -> Array:
-    """Pose between the user's coordinates, of a pose between the clouds with their offsets taken off."""
+    """Pose between the user's coordinates, from a pose between the clouds minus their offsets."""
     raised = T.copy()
     raised[:3, 3] = T[:3, 3] + pair.target.offset - T[:3, :3] @ pair.source.offset
     return raised if pair.placed is None else pair.placed.raised(raised)
@@ -56,7 +56,7 @@ def raise_matches(matches: Correspondences, pair: Pair) -> Correspondences:
 
 
 def lower_matches(matches: Any, pair: Pair) -> Correspondences:
-    """The user's own matches, as the stages take them.
+    """The user's own matches, in the form that the stages take.
 
     Parameters
     ----------

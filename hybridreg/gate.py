@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What a cloud must be before any stage sees it."""
+"""The checks that a cloud must pass before any stage sees it."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ _LARGEST = 1.5e11
 # A cloud thinner than a millionth of its length in two directions fixes no rotation about that length.
 _THINNEST = 1e-6
 _LOT = 2**18  # points
-_FILLED = 0.01  # share of points in the very origin from which they are no returns
-_COARSE = 0.01  # metres between coordinates from which their rounding is told
-_LOOKED_AT = 2_000  # points whose rounding is looked at
+_FILLED = 0.01  # share of points exactly at the origin from which they count as missing returns
+_COARSE = 0.01  # metres between coordinates from which their rounding is reported
+_LOOKED_AT = 2_000  # points whose rounding is checked
 
 
 def coordinates(x: Any, name: str) -> Array:
@@ -33,7 +33,7 @@ def coordinates(x: Any, name: str) -> Array:
         if str(error).startswith(f"{name}: "):
             raise
         raise _unreadable(x, name, error) from error
-    except Exception as error:  # the object is somebody else's, and may raise whatever it likes
+    except Exception as error:  # a third-party object may raise anything
         raise _unreadable(x, name, error) from error
 
 
@@ -45,8 +45,7 @@ def _unreadable(x: Any, name: str, error: Exception) -> ValueError:
 
 
 def finite(points: Array, name: str, *, drop: bool) -> tuple[Array, NDArray[np.bool_] | None]:
-    """Refuse rows with a NaN or an infinity, or leave them out where that was asked for; which rows (N,) are left, None
-    for all."""
+    """Refuse rows with a NaN or an infinity, or drop them on request; returns which rows (N,) remain, None for all."""
     every = np.isfinite(points)
     if every.all():
         return points, None
@@ -63,8 +62,8 @@ def finite(points: Array, name: str, *, drop: bool) -> tuple[Array, NDArray[np.b
 def returned(
     points: Array, rows: NDArray[np.bool_] | None, name: str, *, drop: bool
 ) -> tuple[Array, NDArray[np.bool_] | None]:
-    """Warn of many points exactly at (0, 0, 0), which drivers write where nothing came back; or leave them out where
-    that was asked for. `rows` (N,) are those that `finite` left, and what is returned is as it returns."""
+    """Warn of many points exactly at (0, 0, 0), which drivers write for missing returns, or drop them on request.
+    `rows` (N,) are those that `finite` kept; the result is of the same form."""
     fewest = max(MIN_POINTS, _FILLED * len(points))
     if np.count_nonzero(points[:, 0] == 0.0) < fewest:
         return points, rows
@@ -74,8 +73,8 @@ def returned(
         return points, rows
     if not drop:
         warnings.warn(
-            f"{name}: {n_bad} of {len(points)} points lie exactly at (0, 0, 0), which drivers write where nothing came "
-            'back; remove them or pass nonfinite="drop"',
+            f"{name}: {n_bad} of {len(points)} points lie exactly at (0, 0, 0), which drivers write for missing "
+            'returns; remove them or pass nonfinite="drop"',
             UserWarning,
             stacklevel=4,
         )
@@ -95,7 +94,7 @@ def rounded(points: Array, name: str) -> None:
     if step > _COARSE:
         warnings.warn(
             f"{name}: its coordinates were kept in single precision far from the origin, {step:.2g} m apart; export "
-            "them in double precision, or take a local origin off before they are stored",
+            "them in double precision, or subtract a local origin before they are stored",
             UserWarning,
             stacklevel=4,
         )
@@ -107,7 +106,7 @@ def check(points: Array, name: str) -> None:
     Raises
     ------
     ValueError
-        Fewer than 20 points, points that are not finite or beyond 1.5e11 m, all in one place, all on one line.
+        Fewer than 20 points, points that are not finite or beyond 1.5e11 m, all in one place, or all on one line.
     """
     finite(points, name, drop=False)
     if len(points) == 0:
@@ -134,7 +133,7 @@ def check(points: Array, name: str) -> None:
 
 
 def _lots(points: Array) -> Iterator[Array]:
-    # Along three rows numpy reduces several times as fast as along three columns; in lots no copy of all is made.
+    # numpy reduces three rows several times as fast as three columns; in batches no copy of all is made.
     return (np.ascontiguousarray(points[k : k + _LOT].T) for k in range(0, len(points), _LOT))
 
 

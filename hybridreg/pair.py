@@ -17,7 +17,7 @@ from hybridreg.geometry import se3
 from hybridreg.geometry.placement import Placement
 from hybridreg.geometry.pose_bounds import PoseBounds
 from hybridreg.geometry.viewpoint import Given
-from hybridreg.io.camera_image import Photograph
+from hybridreg.io.camera_image import CameraImage
 
 Array = NDArray[np.float64]
 Gravity = Literal["known", "unknown"]
@@ -25,19 +25,19 @@ Gravity = Literal["known", "unknown"]
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Pair:
-    """What a pipeline receives. It has no field for the truth, so that no stage can peek.
+    """What a pipeline receives. It has no field for the true pose, so that no stage can see it.
 
     Attributes
     ----------
     source, target : PointCloud
         The source moves, the target stays.
     image : (H, W, 3) uint8 or None
-        One photograph of the common view, uncalibrated, RGB. Made of a path, it is decoded when it is first looked at;
-        `has_image` does not look.
+        A camera image of the common view, uncalibrated, RGB. Given as a path, it is decoded on first access;
+        `has_image` does not decode it.
     id : str
         Seeds the pair's random generator together with the run's seed.
     meta : mapping
-        Free facts for reports. Never the pose.
+        Anything that reports should show. Never the pose.
     gravity : "known" or "unknown"
         "known": both clouds have the same side of the ground up, so that a pose that turns the world upside down is
         wrong. "unknown": they may not (an object that was turned over between two scans).
@@ -49,7 +49,7 @@ class Pair:
 
     source: PointCloud
     target: PointCloud
-    image: NDArray[np.uint8] | None = Photograph()  # type: ignore[assignment]  # noqa: RUF009
+    image: NDArray[np.uint8] | None = CameraImage()  # type: ignore[assignment]  # noqa: RUF009
     id: str = "pair"
     meta: Mapping[str, Any] = field(default_factory=dict)
     gravity: Gravity = "known"
@@ -61,17 +61,17 @@ class Pair:
         return self.bounds is None or self.bounds.allow(T)
 
     def with_clouds(self, source: PointCloud, target: PointCloud) -> Pair:
-        """The same pair of other clouds."""
+        """The same pair with other clouds."""
         return self.replaced(source=source, target=target)
 
     def replaced(self, **changes: Any) -> Pair:
-        """The same pair with some fields changed; an image that was not decoded yet still is not."""
-        return replace(self, **{"image": Photograph.held_by(self), **changes})
+        """The same pair with some fields changed; an image that was not decoded yet stays undecoded."""
+        return replace(self, **{"image": CameraImage.held_by(self), **changes})
 
     @property
     def has_image(self) -> bool:
-        """Whether there is a photograph."""
-        return Photograph.held_by(self) is not None
+        """Whether there is an image."""
+        return CameraImage.held_by(self) is not None
 
     @classmethod
     def of(
@@ -110,7 +110,7 @@ class LabelledPair:
     T_target_source : (4, 4) float64
         Maps source points, as the user gave them, to target points.
     overlap : float or None
-        Share of source points that the target saw too, where the data set tells it.
+        Share of source points that the target's sensor saw too, where the data set gives it.
     """
 
     pair: Pair

@@ -31,7 +31,7 @@ from hybridreg.stage import Stage, own_params
 
 @dataclass(frozen=True, eq=False)
 class Trace:
-    """Everything the stages of one run made, in the levels' frames."""
+    """Everything that the stages of one run produced, in the levels' frames."""
 
     scene: Scene
     overlap: Overlap
@@ -146,7 +146,7 @@ class Pipeline(Stage):
             return self.conclude(self.trace(pair, seed=seed, matches=matches), seed=seed)
 
     def conclude(self, trace: Trace, *, seed: int = 0) -> RegistrationResult:
-        """The verdict on a traced run, and its result in the coordinates that the user gave."""
+        """The verdict on a traced run, and its result in the user's coordinates."""
         pair = trace.scene.pair
         with trace.scene.clock.phase("verdict"):
             from hybridreg.verdict import judge, of_scale
@@ -177,7 +177,7 @@ class Pipeline(Stage):
         )
 
     def trace(self, pair: Pair, *, seed: int = 0, matches: Any = None) -> Trace:
-        """Run the stages and keep what each of them made."""
+        """Run the stages and keep what each of them produced."""
         from hybridreg.evidence.match_agreement import of_most
 
         clock = Clock()
@@ -244,7 +244,7 @@ def _within(scene: Scene, pose: Pose) -> Pose:
 
 
 def _proper(pose: Pose) -> Pose:
-    # A stage may return float32 or a matrix that drifted; what leaves the pipeline is a rotation to the last digit.
+    # A stage may return float32 or a matrix that drifted; what the pipeline returns is a rotation to the last digit.
     T: NDArray[np.float64] = np.array(pose.T, dtype=np.float64)
     if T.shape != (4, 4) or not np.isfinite(T).all():
         return Pose.unknown(0 if pose.inliers is None else len(pose.inliers))

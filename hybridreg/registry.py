@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Short names of stages, and the classes behind them, imported when they are asked for."""
+"""Short names of stages, and the classes behind them, imported on demand."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ def load(slot: str, name: str) -> type[Any]:
     Raises
     ------
     KeyError
-        For a name that nobody registered; it lists the known ones.
+        For a name that is not registered; the message lists the known ones.
     ImportError
         A plug-in that cannot be loaded, whatever its import raises; a package that is not installed, with the extra
         that brings it.
@@ -92,14 +92,14 @@ def load(slot: str, name: str) -> type[Any]:
 
 
 def name_of(stage: Any) -> str | None:
-    """Registered `slot.name` of a stage, or None for a class that nobody registered."""
+    """Registered `slot.name` of a stage, or None for a class that is not registered."""
     cls = type(stage)
     here = f"{cls.__module__}:{cls.__qualname__}"
     return next((key for key, target in known().items() if target == here), None)
 
 
 def slot_fits(slot: str, *, needs: frozenset[str] | None = None, gives: str | None = None) -> list[str]:
-    """Names of a slot's stages whose needs lie within `needs`, or that give the word `gives`."""
+    """Names of a slot's stages that need no more than `needs`, or that give the word `gives`."""
     found = []
     for name in names(slot):
         try:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""How finely to look at two clouds when the user does not say."""
+"""Default resolution: voxel, map cell and tolerance of a pair, from the extents of its clouds."""
 
 from __future__ import annotations
 
@@ -13,26 +13,33 @@ from hybridreg.geometry.extent import reach, share_within
 
 Array = NDArray[np.float64]
 
-# Cells along the reach. On vehicle LiDAR (reach 25-50 m) this gives 0.4-0.8 m, in a room 5 cm.
+# Cells along the extent. On vehicle LiDAR (extent 25-50 m) this gives 0.4-0.8 m, in a room 5 cm.
 _CELLS_ALONG_REACH = 60.0
-# Cell of a map seen from above: metres outdoors; in a room, so many along the distance within which nearly all points
-# lie.
-_MAP_CELL, _CELLS_ALONG_MAP, _NEARLY_ALL = 0.5, 60.0, 0.99
-# Of the reaches of two sensors at one place the longer is seldom ten times the shorter.
+# Steps of a derived voxel in a power of ten, for a prepared target: a quarter larger each; by hand.
+_STEPS = 10
+# Cell of a map seen from above.
+_MAP_CELL = 0.5  # metres outdoors; by hand
+_CELLS_ALONG_MAP = 60.0  # in a room, cells along the radius of nearly all points; by hand
+_NEARLY_ALL = 0.99  # share of the points; by hand
+# Of the extents of two sensors' clouds of one place the longer is seldom ten times the shorter.
 _MOST_RATIO = 25.0
-# What counts as right is no more than this share of the shorter reach: half a metre says nothing about a small thing.
+# The tolerance is at most this share of the shorter extent: half a metre says nothing about a small object.
 _OF_REACH = 0.04
 
 
 def default_voxel(source: PointCloud, target: PointCloud) -> float:
-    """Voxel for a pair, metres: the shorter of the two reaches over 60, to two digits.
+    """Voxel for a pair, metres: the shorter of the two extents over 60, to two digits.
 
-    A cloud's reach is the distance from its middle within which nine tenths of its points lie.
+    A cloud's extent is the distance from its middle within which nine tenths of its points lie.
     """
     shorter = min(reach(source.radii), reach(target.radii))
-    # A cloud whose points lie nearly all in one place has no reach to speak of; its extent is the next best.
+    # A cloud whose points lie nearly all in one place has no such extent; its bounding box is the next best.
     length = shorter or max(_longest(cloud) for cloud in (source, target))
-    return float(f"{length / _CELLS_ALONG_REACH:.2g}")
+    voxel = float(f"{length / _CELLS_ALONG_REACH:.2g}")
+    if voxel > 0.0 and (source.kept is not None or target.kept is not None):
+        # So that scans of one sensor share what is kept.
+        return float(f"{10.0 ** (round(_STEPS * np.log10(voxel)) / _STEPS):.2g}")
+    return voxel
 
 
 def map_cell(source: PointCloud, target: PointCloud) -> float:
@@ -42,18 +49,18 @@ def map_cell(source: PointCloud, target: PointCloud) -> float:
 
 
 def size_ratio(source: PointCloud, target: PointCloud) -> float:
-    """Reach of the target over that of the source; 1 where one has none."""
+    """Extent of the target over that of the source; 1 where one has none."""
     a, b = reach(source.radii), reach(target.radii)
     return b / a if a > 0.0 and b > 0.0 else 1.0
 
 
 def comparable(source: PointCloud, target: PointCloud) -> bool:
-    """Whether two clouds may show one place in one unit: their reaches differ by less than 25 times."""
+    """Whether two clouds may show one place in one unit: their extents differ by less than a factor of 25."""
     return 1.0 / _MOST_RATIO < size_ratio(source, target) < _MOST_RATIO
 
 
 class Tolerance(NamedTuple):
-    """How near to the true pose counts as right: `degrees` of its turn, and `metres` at the middle of the source."""
+    """How near to the true pose counts as right: `degrees` of rotation, and `metres` at the middle of the source."""
 
     degrees: float
     metres: float
@@ -64,7 +71,7 @@ VEHICLES = Tolerance(2.0, 0.5)
 
 
 def tolerance(source: PointCloud, target: PointCloud) -> Tolerance:
-    """2 degrees and half a metre for vehicle sensors; less for smaller scenes, 4 % of the shorter reach."""
+    """2 degrees and half a metre for vehicle sensors; less for smaller scenes, 4 % of the shorter extent."""
     shorter = min(reach(source.radii), reach(target.radii)) or _longest(source)
     return VEHICLES._replace(metres=min(VEHICLES.metres, float(f"{_OF_REACH * shorter:.2g}")))
 

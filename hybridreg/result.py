@@ -41,29 +41,30 @@ class RegistrationResult:
         coordinates that the user gave. Its rotation is orthogonal with determinant +1. `T_target_source` is another
         name for it.
     verdict : "ok", "doubtful" or "failed"
+        By `confidence`: "ok" from 0.95 on, "failed" below 0.5, "doubtful" in between: the evidence does not decide.
     confidence : float in [0, 1]
         Estimated probability that the pose is right, to `tolerance`.
     reasons : tuple of str
-        Why the verdict is what it is, in words.
+        The verdict explained in sentences, most serious first.
     overlay : Overlay
-        Both whole clouds at the pose, on which `fitness` and what goes with it is measured when first asked for.
+        Both whole clouds at the pose, on which `fitness` and its companions are computed on first access.
     information : (6, 6) float64
         Sum of J^T J of point-to-plane distances in metres at the pose, rotation (radians) before translation,
-        about the centre of the overlap; a small eigenvalue is a direction that the data leaves open.
+        about the centre of the overlap; a small eigenvalue is a poorly constrained direction.
     rivals : (r, 4, 4) float64
         Other poses that explain the data nearly as well.
     matches : Correspondences
-        What the pose was estimated from, in the coordinates that the user gave; where several matchers ran, those
-        matches that agree with the pose best.
+        What the pose was estimated from, in the user's coordinates; where several matchers ran, the matches of the one
+        that agrees best with the pose.
     evidence : mapping of str to float
         The numbers behind the verdict.
     notes : tuple of str
-        Defaults that were chosen and caps that bit.
+        Defaults that were chosen and limits that were reached.
     seconds : mapping of str to float
         Wall time of each slot and of the verdict; what an estimator matches, refines or weighs on its own counts
         there.
     peak_memory_mb : float or None
-        Highest resident memory of the process during the run.
+        Peak resident memory of the process during the run.
     seed : int
     spec : mapping
         The pipeline that made it, as `Pipeline.save` writes it.
@@ -103,7 +104,7 @@ class RegistrationResult:
 
     @property
     def T_target_source(self) -> Array:
-        """The transformation, under the name that tells its direction."""
+        """The transformation, under the name that states its direction."""
         return self.transformation
 
     @property
@@ -123,12 +124,12 @@ class RegistrationResult:
 
     @property
     def fitness_target(self) -> float:
-        """The share seen from the target."""
+        """The same share for the target's points."""
         return self.overlay.of_target.fitness
 
     @property
     def max_distance(self) -> float:
-        """Farthest that two points of `correspondence_set` lie apart, metres."""
+        """Largest distance between two points of `correspondence_set`, metres."""
         return self.overlay.max_distance
 
     @cached_property

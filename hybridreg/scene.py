@@ -5,13 +5,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Hashable
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any, Literal, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from hybridreg.cloud import PointCloud
 from hybridreg.geometry import ground, normals
 from hybridreg.geometry.ground import Ground
 from hybridreg.geometry.voxel_cells import voxel_centroids
@@ -43,6 +44,11 @@ class Level:
     spacing: float
     viewpoint: Array | None = None
     _normals: dict[int, Array] = field(default_factory=dict, repr=False)
+
+    @classmethod
+    def on_cells(cls, cloud: PointCloud, voxel: float) -> Level:
+        """A cloud's level of the centroids of a grid's cells of one edge, metres."""
+        return cls(points=voxel_centroids(cloud.points, voxel), spacing=voxel, viewpoint=cloud.viewpoint)
 
     def __len__(self) -> int:
         return len(self.points)
@@ -109,7 +115,7 @@ class Scene:
         """Both clouds as the centroids of a grid's cells of one edge, metres."""
         clouds = thinned(pair, voxel)
         source, target = (
-            Level(points=voxel_centroids(cloud.points, voxel), spacing=voxel, viewpoint=cloud.viewpoint)
+            cloud.once(("level", voxel), partial(Level.on_cells, cloud, voxel))
             for cloud in (clouds.source, clouds.target)
         )
         return cls(pair=clouds, source=source, target=target)

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """The five slots of a pipeline, as protocols: a stage conforms by its signature, without importing anything.
 
-A stage may also carry `needs` and `gives`, sets of the words below, so that a pipeline can refuse a misfit when
-it is built: "image", "matches", "group".
+A stage may also carry `needs` and `gives`, sets of the words below, so that a pipeline can refuse stages that do not
+fit when it is built: "image", "matches", "group".
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ class Downsample(Protocol):
 
 
 class FindOverlap(Protocol):
-    """Tell which points lie in the part that both sensors saw."""
+    """Find which points lie in the part that both sensors saw."""
 
     def __call__(self, scene: Scene, /) -> Overlap: ...
 

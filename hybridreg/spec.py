@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
 """Stages as plain tables, for TOML files and stored results.
 
-A table names a registered stage and its fields: `{stage = "match.fpfh", radius = 1.25}`. Reading one can only
-make objects of registered classes, so a file from a stranger cannot run code of its own. Inside a stage's table, a
-field that is called as a slot holds a stage of that slot, and a table of slots one stage for each:
+A table names a registered stage and its fields: `{stage = "match.fpfh", radius = 1.25}`. Reading one can only create
+objects of registered classes, so a file from an untrusted source cannot run code. Inside a stage's table, a field with
+a slot's name holds a stage of that slot, and a table of slots one stage for each:
 `{match = "fpfh", estimate = "ransac"}`.
 """
 
@@ -23,7 +23,7 @@ from hybridreg.stage import own_params
 
 
 def to_table(stage: Any, slot: str | None = None) -> dict[str, Any]:
-    """Table of a stage; inside its own slot the short name is enough."""
+    """Table of a stage; inside its own slot the short name suffices."""
     registered = registry.name_of(stage)
     if registered is None:
         named = stage if hasattr(stage, "__qualname__") else type(stage)
@@ -57,9 +57,9 @@ def from_table(table: Any, slot: str | None = None) -> Any:
     Raises
     ------
     KeyError
-        A stage that nobody registered.
+        A stage that is not registered.
     ValueError
-        A field that the stage does not have, a value of another type than the field's, or a table without a `stage`.
+        A field that the stage does not have, a value of the wrong type, or a table without a `stage`.
     """
     if isinstance(table, str):
         table = {"stage": table}
@@ -81,7 +81,7 @@ def _typed(cls: type[Any], fields: dict[str, Any], where: str) -> dict[str, Any]
         return fields
     try:
         hints = typing.get_type_hints(cls)
-    except NameError:  # somebody's annotations, of names that only a type checker imports
+    except NameError:  # third-party annotations, of names that only a type checker imports
         return fields
     return {
         key: plain_values.value_of(hints[key], value, f"{where}: {key}") if key in hints else value

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Clouds of many millions of points, thinned to what any stage can tell apart: they cost no more than others."""
+"""Clouds of many millions of points, thinned to what any stage can resolve: they cost no more than others."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from hybridreg.geometry.voxel_cells import voxel_cells, voxel_centroids
 from hybridreg.pair import Pair
 from hybridreg.resolution import comparable, default_voxel
 
-# Points from which a cloud is thinned, and cells along an edge of the voxel that are left: surfaces are fitted, and
-# free space is seen, at no less than half a voxel.
-_MANY, _CELLS = 1_500_000, 4
-# Of clouds of unlike reach each has its own voxel, as in `hybridreg.resolution`.
+_MANY = 1_500_000  # points above which a cloud is thinned; by hand
+# Cells kept along the edge of a voxel: surfaces are fitted, and free space is tested, at no less than half a voxel.
+_CELLS = 4
+# Clouds of very different extent have a voxel each, as in `hybridreg.resolution`.
 _CELLS_ALONG_REACH = 60.0
-# Occupied cells per point from which a draw fills a volume.
+# Occupied cells per point above which a random sample fills a volume.
 _SPREAD = 0.35
 
 
@@ -41,16 +41,20 @@ def _thinned(cloud: PointCloud, pair: Pair, voxel: float | None) -> PointCloud:
     if voxel is None:
         alike = comparable(pair.source, pair.target)
         voxel = default_voxel(pair.source, pair.target) if alike else reach(cloud.radii) / _CELLS_ALONG_REACH
+    return cloud.once(("thinned", voxel), lambda: _of_cells(cloud, voxel))
+
+
+def _of_cells(cloud: PointCloud, voxel: float) -> PointCloud:
     cells = voxel_cells(cloud.points, _cell(cloud, voxel))
     cells.centroids.setflags(write=False)
     said = cloud.said
     if said is not None and said.of_point is not None:
         said = said._replace(of_point=said.of_point[cells.first])
-    return replace(cloud, points=cells.centroids, said=said)
+    return replace(cloud, points=cells.centroids, said=said, kept=None if cloud.kept is None else {})
 
 
 def _cell(cloud: PointCloud, voxel: float) -> float:
-    # Of points on surfaces a million fall into far fewer cells than they are.
+    # A million points on surfaces fall into far fewer cells.
     drawn, cell = some(cloud.points), voxel / _CELLS
     while 2.0 * cell <= voxel and len(voxel_centroids(drawn, cell)) > _SPREAD * len(drawn):
         cell *= 2.0

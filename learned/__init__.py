@@ -1,1 +1,2 @@
 # SPDX-License-Identifier: MIT
+"""Networks, one folder each, and what they share: layers, pyramid, matching, losses, stages, training."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Checkpoints as the authors of networks published them, read without running anything in them."""
+"""Checkpoints as published by the authors of networks, read without running any code in them."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from hybridreg.io.formats.torch_file import parse_torch
 from hybridreg.io.whole_files import read_whole
 
 _ENDINGS = (".tar", ".pth", ".pt", ".pkl")
-# Under which of these a published file has its tensors, if not at the top.
+# Keys under which a published file may have its tensors, if not at the top level.
 _KEYS = ("state_dict", "model")
 
 
@@ -34,21 +34,21 @@ class Checkpoint:
 
 
 def is_checkpoint(weights: str) -> bool:
-    """Is it the name of a published checkpoint, not of a folder?"""
+    """Whether a name is that of a published checkpoint and not of a folder."""
     return weights.endswith(_ENDINGS)
 
 
 def read_checkpoint(path: str | os.PathLike[str]) -> Checkpoint:
     """Read a checkpoint with ``weights_only``: a bare state dict, or one under ``state_dict`` or ``model``.
 
-    The prefix ``module.`` of parallel training is taken off.
+    The prefix ``module.`` of parallel training is removed.
 
     Raises
     ------
     FileNotFoundError
         No such file.
     ValueError
-        Damaged, with anything else inside than tensors and plain values, or without a state dict.
+        Damaged, with contents other than tensors and plain values, or without a state dict.
     """
     file = Path(path)
     if not file.is_file():

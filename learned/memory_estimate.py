@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""How much memory a forward pass will take, told before it runs: too much is refused, not killed."""
+"""Memory estimate of a forward pass before it runs: too much is refused instead of being killed."""
 
 from __future__ import annotations
 
@@ -11,13 +11,15 @@ from hybridreg.learned.cross3dreg.config import NetworkConfig
 from hybridreg.learned.pyramid.point_pyramid import Pyramid
 
 _FLOAT = 4
-_LINK = 84  # bytes a link: two indices, offset and length, and the tenth of the kernel points that it reaches
+_LINK = (
+    84  # bytes a link: two indices, offset and length, and the tenth of the kernel points that it influences
+)
 _COPIES = 4  # of a stage's widest features alive at a time: input, output, and the steps between
-SLACK = 2**26  # what the heap holds beside what is in use: 10 to 80 MB for one and the same pass
+SLACK = 2**26  # heap overhead on top of what is in use: 10 to 80 MB for the same pass
 
 
 def forward_bytes(pyramid: Pyramid, config: NetworkConfig) -> int:
-    """Estimated peak of a forward pass in bytes, beside what the process and the batch hold already."""
+    """Estimated peak of a forward pass in bytes, on top of what the process and the batch already hold."""
     stages = range(pyramid.stages)
     width = config.backbone.init_dim * 2
     encoder = max(stage_bytes(pyramid, stage, width * 2**stage) for stage in stages)
@@ -32,7 +34,7 @@ def stage_bytes(pyramid: Pyramid, stage: int, width: int) -> int:
 
 
 def _attention_bytes(pyramid: Pyramid, config: NetworkConfig) -> int:
-    # The structure embedding of both clouds, its parts once more where they are put together, and the scores.
+    # The structure embedding of both clouds, its parts again while they are concatenated, and the scores.
     counts = [min(n, config.matching.max_superpoints) for n in pyramid.lengths[-1]]
     transformer = config.transformer
     per_pair = (transformer.hidden_dim + 3 * transformer.heads) * _FLOAT
@@ -40,7 +42,7 @@ def _attention_bytes(pyramid: Pyramid, config: NetworkConfig) -> int:
 
 
 def available_bytes(device: torch.device | str = "cpu") -> int | None:
-    """Memory that a run can still take on a device; None where the system does not tell."""
+    """Memory available on a device; None where the system does not report it."""
     if torch.device(device).type == "cuda":
         return torch.cuda.mem_get_info(device)[0]
     try:
@@ -64,14 +66,14 @@ def require_memory(pyramid: Pyramid, config: NetworkConfig) -> None:
     Raises
     ------
     ValueError
-        The estimate exceeds what is free; the message names the points, both figures and the cure.
+        The estimate exceeds what is free; the message names the points, both figures and what to do.
     """
     cure = f"use a network with a voxel larger than {config.backbone.voxel:g} m, or crop the clouds"
     require_bytes(forward_bytes(pyramid, config), pyramid.lengths[0], pyramid.points[0].device, cure)
 
 
 def require_bytes(needed: int, lengths: tuple[int, int], device: torch.device | str, cure: str) -> None:
-    """Refuse what would not fit a device: so many bytes for so many target and source points.
+    """Refuse what would not fit a device: bytes needed for target and source points of these numbers.
 
     Raises
     ------

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The networks by name: all that loading, stages, training and listings know about which there are."""
+"""The networks by name: the only place where loading, stages, training and listings learn which there are."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from hybridreg.learned.pretrained import Pretrained
 
-# What a config.json and a recipe without the key "network" mean.
+# The network of a config.json or a recipe without the key "network".
 DEFAULT = "cross3dreg"
 
 # Class of each network; a config.json names it under "network".

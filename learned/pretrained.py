@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What every network offers beside its computation: sizes by name, and weights that are written and read."""
+"""The base class of all networks: sizes by name, and weights that are written and read."""
 
 from __future__ import annotations
 
@@ -23,15 +23,15 @@ if TYPE_CHECKING:
 class Pretrained(nn.Module):
     """A network of `hybridreg.learned.network_table`.
 
-    A subclass is made from a configuration alone, offers ``forward(batch)`` without a truth, and says:
+    A subclass is built from a configuration alone, offers ``forward(batch)`` without the ground truth, and defines:
 
     Attributes
     ----------
     name : its entry in the table
     config_type : the class of its configuration, with ``to_dict`` and ``from_dict``
     sizes : names that `named_config` knows
-    loss_names : what the parts of its losses are called
-    together : do the examples of a training step go through it at once? `collate` makes one of several then
+    loss_names : names of the parts of its losses
+    together : whether the examples of a training step are processed at once, joined by `collate`
     validated_with : fields of its stage while it is validated in training
     """
 
@@ -50,12 +50,12 @@ class Pretrained(nn.Module):
 
     @classmethod
     def named(cls, size: str, **parts: Any) -> Self:
-        """A network of random weights of a size by name; ``KeyError`` lists the known ones."""
+        """A network with random weights of a size by name; ``KeyError`` lists the known ones."""
         return cls(cls.named_config(size, **parts))
 
     @classmethod
     def seeded(cls, config: Any, seed: int) -> Self:
-        """A network of random weights; ``seed`` fixes what does not follow torch's generator."""
+        """A network with random weights; ``seed`` fixes what does not follow torch's generator."""
         return cls(config)
 
     @classmethod
@@ -87,7 +87,7 @@ class Pretrained(nn.Module):
         FileNotFoundError
             No such folder and no such name; the message lists the names.
         ValueError
-            A damaged file, another network's, or a wrong tensor: it is named.
+            A damaged file, one of another network, or a wrong tensor: it is named.
         """
         found = from_pretrained(name_or_folder, cls.name)
         assert isinstance(found, cls)
@@ -99,7 +99,7 @@ class Pretrained(nn.Module):
 
     @staticmethod
     def example(pair: TruePair, config: Any, rng: np.random.Generator) -> tuple[Any, Any]:
-        """Batch and targets of a training step, on the CPU; ``rng`` decides all draws.
+        """Batch and targets of a training step, on the CPU; ``rng`` makes all random choices.
 
         Raises
         ------
@@ -110,11 +110,11 @@ class Pretrained(nn.Module):
 
     @staticmethod
     def collate(examples: Sequence[tuple[Any, Any]]) -> tuple[Any, Any]:
-        """One example of several."""
+        """Several examples joined into one."""
         raise NotImplementedError
 
     def training_output(self, batch: Any) -> Any:
-        """As much of a forward pass as `losses` needs."""
+        """The part of a forward pass that `losses` needs."""
         return self(batch)
 
     def losses(self, output: Any, targets: Any) -> Losses:
@@ -123,7 +123,7 @@ class Pretrained(nn.Module):
 
     @property
     def voxel(self) -> float | None:
-        """Edge (m) of the grid that it looks at clouds on; None where there is none."""
+        """Voxel (m) at which it takes clouds; None where there is none."""
         backbone = getattr(self.config, "backbone", self.config)
         return getattr(backbone, "voxel", None)
 
@@ -133,4 +133,4 @@ class Pretrained(nn.Module):
 
     @abstractmethod
     def memory(self, batch: Any) -> int:
-        """Predicted peak of a forward pass in bytes, beside what the process and the batch hold already."""
+        """Predicted peak of a forward pass in bytes, on top of what the process and the batch already hold."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A pair of clouds with its true pose, as a network's training examples are made from it."""
+"""A pair of clouds with its true pose, from which a network's training examples are made."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class TruePair:
-    """Clouds in their own frames, metres, each with the place that it was seen from. They lie on no grid: spacing 0."""
+    """Clouds in their own frames, metres, each with its viewpoint. They are not voxelised: spacing 0."""
 
     target: Level
     source: Level
@@ -26,7 +26,7 @@ class TruePair:
     def of(
         target: Array, source: Array, truth: Array, places: tuple[Array | None, Array | None] = (None, None)
     ) -> TruePair:
-        """From points (M, 3), (N, 3), the true pose (4, 4), and where target and source were seen from."""
+        """From points (M, 3), (N, 3), the true pose (4, 4), and the viewpoints of target and source."""
         levels = [
             Level(points=points, spacing=0.0, viewpoint=place)
             for points, place in zip((target, source), places, strict=True)
@@ -34,7 +34,7 @@ class TruePair:
         return TruePair(target=levels[0], source=levels[1], T_target_source=truth)
 
     def scaled(self, factor: float) -> TruePair:
-        """Everything larger by a factor."""
+        """Everything scaled by a factor."""
         levels = [
             Level(
                 points=level.points * factor,
@@ -48,7 +48,7 @@ class TruePair:
         return TruePair(target=levels[0], source=levels[1], T_target_source=truth)
 
     def moved(self, motions: tuple[Array, Array], jitter: float, rng: np.random.Generator) -> TruePair:
-        """Each cloud, target first, moved with the place that it was seen from; noise of half the width ``jitter``."""
+        """Each cloud, target first, moved with its viewpoint; noise of half-width ``jitter``."""
         levels = [
             Level(
                 points=_moved(level.points, T) + rng.uniform(-jitter, jitter, level.points.shape),
@@ -67,7 +67,7 @@ class TruePair:
 
 
 def torch_generator(rng: np.random.Generator) -> torch.Generator:
-    """A generator of torch that a generator of numpy decides."""
+    """A torch generator seeded from a numpy generator."""
     return torch.Generator().manual_seed(int(rng.integers(2**62)))
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Was a network ever trained? Its weights alone can tell."""
+"""Whether a network was ever trained, from its weights alone."""
 
 from __future__ import annotations
 
@@ -10,9 +10,8 @@ from torch import nn
 def untrained_parts(network: nn.Module) -> frozenset[str]:
     """Names of the network's parts (``backbone``, ``omp``, ...) that no training step has touched.
 
-    Normalisation layers are made with a scale of one and a shift of zero, and the first step of any optimiser
-    moves them; a part in which all of them are as they were made is random. Parts without such layers are never
-    named.
+    Normalisation layers are initialised with a scale of one and a shift of zero, and the first optimiser step changes
+    them; a part in which all of them are unchanged is random. Parts without such layers are never named.
     """
     return frozenset(name for name, part in network.named_children() if _as_made(part))
 

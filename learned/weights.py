@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Weights on disk: safetensors beside a config.json, and checkpoints by the names that the originals' tensors have."""
+"""Weights on disk: safetensors beside a config.json, and checkpoints with the originals' tensor names."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def save_pretrained(network: Pretrained, folder: str | os.PathLike[str], *, half
     """
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
-    # Versions before the other networks read a config.json that names none.
+    # Versions before the other networks wrote a config.json without a name.
     named = {} if network.name == DEFAULT else {"network": network.name}
     text = json.dumps({**named, **network.config.to_dict()}, indent=1) + "\n"
     tensors = {name: tensor.detach().cpu().contiguous() for name, tensor in network.state_dict().items()}
@@ -41,7 +41,7 @@ def save_pretrained(network: Pretrained, folder: str | os.PathLike[str], *, half
         tensors = {
             name: tensor.half() if tensor.is_floating_point() else tensor for name, tensor in tensors.items()
         }
-    # Serialised here: safetensors would replace the file by one that its owner alone can read.
+    # Serialised here: safetensors would replace the file by one that only its owner can read.
     write_bytes(folder / WEIGHTS_FILE, save(tensors))
     write_text(folder / CONFIG_FILE, text)
 
@@ -60,7 +60,7 @@ def from_pretrained(name_or_folder: str | os.PathLike[str], wanted: str | None =
         No such folder and no such name (`MissingWeights`); the message lists the names.
     ValueError
         A file is damaged, of another network than the wanted one, or a tensor is missing, superfluous, of another
-        shape, no float of 16 bits or more, not finite, or a weight of zeros only: it is named.
+        shape, not a float of 16 bits or more, not finite, or a weight of zeros only: it is named.
     """
     folder = _find(name_or_folder)
     cls, config = _read_config(folder, wanted)
@@ -146,7 +146,7 @@ def _fault(name: str, tensor: Tensor, expected: Tensor) -> str:
     if not expected.is_floating_point():
         return "" if tensor.dtype == expected.dtype else f"is {tensor.dtype}, not {expected.dtype}"
     if tensor.dtype not in _FLOATS:
-        # Whole numbers and eight bits are quantised: they mean nothing without the scale that they lack here.
+        # Integers and eight bits are quantised: meaningless without their scale, which is missing here.
         return f"is {tensor.dtype}; store it as float32, float16 or bfloat16"
     if not bool(torch.isfinite(tensor).all()):
         return "holds values that are not finite"
@@ -163,7 +163,7 @@ def load_official(
     Parameters
     ----------
     network
-        Its name; without one GeoTransformer's checkpoints are read.
+        Its name; by default GeoTransformer's checkpoints are read.
     """
     return network_class(network).load_official(path, size, **options)
 
@@ -175,14 +175,14 @@ def load_official_tensors(
     naming: Callable[[str], str] = official_name,
     unused: Collection[str] = (),
 ) -> None:
-    """Load tensors that bear a checkpoint's names, strictly.
+    """Load tensors with a checkpoint's names, strictly.
 
     Parameters
     ----------
     naming
-        Gives the checkpoint's name for ours. Where we have a linear layer, its convolution of size one is taken too.
+        Gives the checkpoint's name for ours. Where we have a linear layer, a convolution of size one is accepted too.
     unused
-        Names that every checkpoint holds and no computation reads: they must be there, and are left aside.
+        Names that every checkpoint contains but no computation uses: they must be there, and are ignored.
 
     Raises
     ------
@@ -195,7 +195,7 @@ def load_official_tensors(
     state = network.state_dict()
     ours = {naming(name): name for name in state}
     left = set(unused)
-    # Every name that is not official is kept as it is, so that it is reported.
+    # Every name that is not official is kept, so that it is reported.
     given = {ours.get(name, name): tensor for name, tensor in tensors.items() if name not in left}
     load_tensors(network, {name: _as_ours(tensor, state.get(name)) for name, tensor in given.items()}, origin)
 

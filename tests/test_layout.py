@@ -35,6 +35,7 @@ ORDER = (
         "candidates",
         "changes",
         "fitting",
+        "many",
         "output",
         "pipeline",
         "presets",
@@ -122,3 +123,13 @@ def test_a_name_leads_to_one_file_and_folders_and_files_stay_small() -> None:
     lines = sorted(len(path.read_text().splitlines()) for path in product if path.stem != "__init__")
     assert lines[-1] <= 300
     assert lines[len(lines) // 2] <= 115
+
+
+def test_no_two_test_modules_have_one_name() -> None:
+    # pytest imports them by their base names.
+    names = Counter(
+        path.name
+        for path in (ROOT / "tests").rglob("*.py")
+        if path.name not in ("conftest.py", "__init__.py")
+    )
+    assert not [name for name, n in names.items() if n > 1]

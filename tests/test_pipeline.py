@@ -174,7 +174,7 @@ def test_mistyped_keyword_is_refused_at_once() -> None:
 def test_misfit_is_refused_when_built_and_names_what_would_fit() -> None:
     with pytest.raises(ValueError, match=r"Ransac.*needs 'matches'.*NoMatch.*fpfh.*kiss"):
         hr.Pipeline(match="none", estimate="ransac")
-    with pytest.raises(ValueError, match="no stage"):
+    with pytest.raises(ValueError, match="not a stage"):
         hr.Pipeline(refine=3)
 
 
@@ -282,8 +282,8 @@ def test_save_and_load(tmp_path: Path) -> None:
     "text, words",
     [
         ("match = ", "not a TOML file"),
-        ("matcher = 'fpfh'", "matcher is no slot"),
-        ("match = 3", "match: 3 is no stage"),
+        ("matcher = 'fpfh'", "matcher is not a slot"),
+        ("match = 3", "match: 3 is not a stage"),
         ("[match]\nradius = 1.0", "expected a stage's name"),
         ("[match]\nstage = 'fpfh'\nradious = 1.0", "radious"),
     ],

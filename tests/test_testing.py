@@ -85,7 +85,7 @@ def test_an_estimator_that_claims_too_much_is_caught() -> None:
 def test_an_unregistered_stage_must_name_its_slot() -> None:
     with pytest.raises(ValueError, match="which slot"):
         testing.check_stage(Careless())
-    with pytest.raises(AssertionError, match="is no slot"):
+    with pytest.raises(AssertionError, match="is not a slot"):
         testing.check_stage(Careless(), "matching")
 
 

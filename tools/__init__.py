@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: MIT
-"""Fuzzing, kills, pictures and README figures: what maintainers run."""
+"""Maintainers' tools: fuzzing, kill tests, pictures and README figures."""

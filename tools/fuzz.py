@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Hostile inputs of every kind, each in a watched process: no crash, no hang, no exception that is not documented.
+"""Fuzzing: hostile inputs of every kind, each in a watched process: no crash, no hang, no undocumented exception.
 
 Arrays, files, images, TOML, stored JSON and weights are drawn by hypothesis, the same ones for the same seed.
-A finding is printed with the case that makes it again: `eval` its text in `tools.hostile`, call `run`.
+A finding is printed with the case that reproduces it: `eval` its text in `tools.hostile`, call `run`.
 
     python -m tools.fuzz --inputs 2000
 """
@@ -43,7 +43,7 @@ def main() -> int:
 
 
 class Teller:
-    """Prints a finding when it is made, and the next ones from the same place as a dot."""
+    """Prints a finding when it occurs, and further ones from the same place as a dot."""
 
     def __init__(self) -> None:
         self.seen: set[str] = set()

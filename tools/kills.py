@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
 """SIGKILL during a batch at random moments: no finished pair is lost, doubled or changed, and the table is the same.
 
-A table of two methods on small made pairs is run once without disturbance, then killed again and again at seeded
-moments and begun anew, with one worker and with two. Then two at a time are begun into one folder: one is refused, and
-nothing is lost either.
+A table of two methods on small synthetic pairs is run once undisturbed, then repeatedly killed at seeded moments and
+restarted, with one worker and with two. Then two at a time are started in one folder: one is refused, and again
+nothing is lost.
 
     python -m tools.kills --kills 20
 """

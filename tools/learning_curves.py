@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Learning curves of training runs, one column a run: losses, and what the validation found.
+"""Learning curves of training runs, one column a run: losses and validation figures.
 
     python -m tools.learning_curves docs/training --out docs/training.png
 
@@ -17,7 +17,7 @@ from hybridreg.eval.report.cloud_pictures import new_figure, save
 from hybridreg.learned.training.curve_files import CurveFile
 
 LOSSES = ("infonce", "coarse", "fine", "mask")
-# Of a validation: in a warm-up the inlier ratio is that of mutual nearest neighbours.
+# Validation figures: in a warm-up the inlier ratio is that of mutual nearest neighbours.
 FOUND = ("inlier_ratio", "pir", "recall", "mask_f1")
 COLOURS = ("#1b6ca8", "#d95f02", "#3a7d44", "#8e44ad")
 
@@ -36,7 +36,7 @@ def smoothed(values: list[float], width: int = 5) -> list[float]:
 
 
 def runs(folder: Path) -> Iterator[Path]:
-    """Folders with a log, oldest training first as far as their names tell."""
+    """Folders with a log, oldest training first as far as their names show."""
     order = {"warm-up": 0, "trunk": 1}
     found = [file.parent for file in folder.glob("*/log.csv")]
     yield from sorted(found, key=lambda run: (order.get(run.name, 2), run.name))

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: MIT
-"""Put measured tables into a page, between their markers, so that no figure there is typed by hand.
+"""Put measured tables into a page between their markers, so that no figure there is typed by hand.
 
     python -m tools.readme real=runs/real/table.md peers=runs/peers.md
 
-replaces what stands in README.md between `<!-- real -->` and `<!-- /real -->` by that file, and so on; of a file that
-`hybridreg table` wrote, by its first protocol's caption, results and verdicts, or the `--sections` whose titles begin
-as told. `--page docs/simulator.md` names another page.
+replaces the text in README.md between `<!-- real -->` and `<!-- /real -->` by that file, and so on; of a file that
+`hybridreg table` wrote, by its first protocol's caption, results and verdicts, or the given `--sections`, by the
+beginnings of their titles. `--page docs/simulator.md` names another page.
 """
 
 from __future__ import annotations
@@ -36,7 +36,8 @@ def insert(page: str, name: str, text: str) -> str:
 
 
 def shown(text: str, sections: Sequence[str] = _SHOWN) -> str:
-    """Caption and some sections of a table's first protocol, results and verdicts; any other text as it is."""
+    """Caption and some sections of a table's first protocol, by default results and verdicts; any other text
+    unchanged."""
     protocols = re.split(r"^## .*$", text, flags=re.MULTILINE)
     if len(protocols) < 2:
         return text

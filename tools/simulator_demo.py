@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Makes the pair that ships in hybridreg/data/demo: a MEMS fan against a 64-beam spinning LiDAR.
+"""Generate the pair that ships in hybridreg/data/demo: a MEMS fan against a 64-beam spinning LiDAR.
 
 python -m tools.simulator_demo
 
-The pair that lies there was made by version 1 of the simulator; another version makes another pair.
+The shipped pair was made by version 1 of the simulator; another version makes another pair.
 """
 
 from __future__ import annotations
@@ -13,7 +13,11 @@ from pathlib import Path
 from hybridreg.data import simulate
 from hybridreg.data.simulate.labelled import pair_id
 
-TIER, SPLIT, SEED, INDEX, VOXEL = "near", "val", 7, 0, 0.25
+TIER = "near"
+SPLIT = "val"
+SEED = 7
+INDEX = 0
+VOXEL = 0.25  # metres
 
 
 def main() -> None:

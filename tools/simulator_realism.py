@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: MIT
-"""Are simulated clouds like real ones? Prints the table of docs/simulator.md.
+"""Compares simulated clouds with real ones; prints the table of docs/simulator.md.
 
 python -m tools.simulator_realism [--clouds 12] [--real ../shared/data/real]
 
-Every figure is taken by the same code on the real clouds of one sensor model and on simulated clouds of that
-model, from the height of the real mount in the kinds of scene where the real ones were recorded.
+Every figure is computed by the same code on the real clouds of one sensor model and on simulated clouds of that
+model, at the height of the real mount, in the kinds of scene where the real ones were recorded.
 
-What real clouds differ among themselves: most models were recorded at one or two places only, so their least and
-most are widened by the spread between places (standard deviation, pooled over the models recorded at three or
+Variation among real clouds: most models were recorded at only one or two places, so their minimum and maximum are
+widened by the spread between places (standard deviation, pooled over the models recorded at three or
 more; as a share of the mean for counts and distances). A simulated median inside that range counts as agreeing.
 """
 
@@ -63,7 +63,7 @@ MATCHES = (
 
 
 def range_shares(points: np.ndarray) -> dict[str, float]:
-    """Share of the points in each range bin; the sensor's own carrier (under 2.5 m) left out."""
+    """Share of the points in each range bin; without the sensor's own carrier (under 2.5 m)."""
     distance = np.linalg.norm(points, axis=1)
     counts, _ = np.histogram(distance[distance > 2.5], RANGE_EDGES)
     labels = [f"{a}-{b} m" if b < 500 else f"over {a} m" for a, b in itertools.pairwise(RANGE_EDGES)]

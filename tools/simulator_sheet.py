@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Contact sheet of simulated pairs: both clouds from above at the true pose, and the photograph.
+"""Contact sheet of simulated pairs: both clouds from above at the true pose, and the camera image.
 
 python -m tools.simulator_sheet docs/simulator.png
 """
@@ -22,7 +22,7 @@ TIERS = ("near", "near", "mid", "mid", "mid", "far", "far", "far", "degenerate",
 
 
 def draw_pair(axes: np.ndarray, tier: str, index: int, seed: int) -> None:
-    """One column: bird's-eye view above, photograph below."""
+    """One column: bird's-eye view above, camera image below."""
     sample = simulate.pair(tier, seed=seed, index=index, split="val")
     T = sample.T_target_source
     source = (

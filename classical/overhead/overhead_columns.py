@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A cloud from above: columns of places that it fills, and that its sensor looked through, in layers of height."""
+"""A cloud projected from above: occupied columns and free ones, in layers of height."""
 
 from __future__ import annotations
 
@@ -14,11 +14,14 @@ from hybridreg.geometry.terrain import Terrain
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
-# Edge of a terrain cell, in columns.
+# Edge of a terrain cell, columns; by hand.
 _TERRAIN = 8.0
-# Free places are told apart more coarsely (columns), up to so many such places before a ray's return, from about so
-# many places in all: neighbouring rays cross the same ones.
-_FREE_WIDTH, _BEFORE, _MOST_PLACES = 1.5, 1, 120_000
+# Edge of a free column, columns: free space needs less detail; by hand.
+_FREE_WIDTH = 1.5
+# Free columns left out before a ray's return; by hand.
+_BEFORE = 1
+# Samples of all rays together, about: neighbouring rays cross the same columns; for speed.
+_MOST_PLACES = 120_000
 
 
 class Columns(NamedTuple):
@@ -29,7 +32,7 @@ class Columns(NamedTuple):
 
 
 class FromAbove(NamedTuple):
-    """One cloud: where it has points, and where its rays went through without any."""
+    """One cloud: columns that hold points, and columns that only rays cross."""
 
     filled: Columns
     free: Columns

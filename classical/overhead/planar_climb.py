@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""From a coarse pose on the ground to the best one near by, on a finer map."""
+"""A coarse pose on the ground improved on a finer map."""
 
 from __future__ import annotations
 
@@ -14,21 +14,23 @@ from hybridreg.geometry.stencil import NEIGHBOURS
 Array = NDArray[np.float64]
 Floats = NDArray[np.float32]
 
-# Moves; the step is halved after each.
+# Moves, each half as long as the one before; by hand.
 _MOVES = 3
-# Columns that vote.
+# Columns that are compared: for speed.
 _MOST_COLUMNS = 800
-# Poses nearer than both are one.
-_SAME_CELLS, _SAME_DEG = 2.0, 3.0
+# Poses nearer than both are one: cells; by hand.
+_SAME_CELLS = 2.0
+# Degrees; by hand.
+_SAME_DEG = 3.0
 
 
 def climb(
     source: FromAbove, target: FromAbove, start: Planar, *, cell: float, step_deg: float, step: float
 ) -> Planar:
-    """Better poses near each of `start`, in the same order and with the same scores, less those that meet.
+    """Better poses near each of `start`, in the same order and with the same scores, without duplicates.
 
-    The coarse map ranks poses better than the fine one, which asks more of levelling and of equal sampling than two
-    different sensors give; so the fine one only says where exactly.
+    The coarse map ranks poses better than the fine one, which is more sensitive to levelling and to unequal sampling;
+    so the fine one only improves the position.
 
     Parameters
     ----------

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""From a coarse motion along the ground to the pose that lays one relief upon another."""
+"""A coarse motion along the ground improved until both reliefs correlate best."""
 
 from __future__ import annotations
 
@@ -12,15 +12,22 @@ from hybridreg.geometry.stencil import NEIGHBOURS
 
 Array = NDArray[np.float64]
 
-# How often the step is halved, moves at each, and places that are looked at.
-_HALVINGS, _TIMES, _MOST_PLACES = 5, 2, 1_000
-# Rounds in which the grounds are laid on one another, the gap in cells from which a place counts less, and the fewest
-# places.
-_ROUNDS, _SMOOTH, _FEWEST = 4, 0.08, 20
+# Lengths of the step, each half of the one before; by hand.
+_HALVINGS = 5
+# Moves at each length; by hand.
+_TIMES = 2
+# Cells that are compared: for speed.
+_MOST_PLACES = 1_000
+# Rounds in which one ground is fitted to the other; by hand.
+_ROUNDS = 4
+# Gap from which a cell counts less, cells; by hand.
+_SMOOTH = 0.08
+# Fewest cells; by hand.
+_FEWEST = 20
 
 
 def climb(source: Relief, target: Relief, planar: list[Array], step: float) -> list[Array]:
-    """Each motion (4, 4), moved by ever shorter steps (the first in metres) to where the reliefs are most alike."""
+    """Each motion (4, 4), moved by ever shorter steps (the first in metres) to the best correlation of the reliefs."""
     every = -(-len(source.places) // _MOST_PLACES)
     places = se3.apply(source.T_level_cloud, source.places[::every])[:, :2]
     known = ~np.isnan(target.grid)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Where and how turned is one cloud's relief most like another's? All yaws, all shifts, by FFT."""
+"""Correlation of two ground reliefs at all yaws and shifts, by FFT."""
 
 from __future__ import annotations
 
@@ -14,9 +14,13 @@ from hybridreg.runtime.cores import n_threads
 Array = NDArray[np.float64]
 Floats = NDArray[np.float32]
 
-# The search's cell in cells of the reliefs; degrees between yaws, and yaws at once. Hollows are metres wide.
-COARSE, _YAW_STEP_DEG, _BATCH = 2.0, 2.0, 4
-# Common cells from which heights are compared.
+# Edge of a cell of the search, cells of the reliefs, whose undulations are metres wide; by hand.
+COARSE = 2.0
+# Degrees between yaws; by hand.
+_YAW_STEP_DEG = 2.0
+# Yaws at once: for memory.
+_BATCH = 4
+# Fewest common cells; by hand.
 _FEWEST = 25
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Columns as a map of evidence: above nought where the cloud has points, below where its rays went through."""
+"""Columns as a signed map: positive where occupied, negative where free."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from hybridreg.classical.overhead.overhead_columns import Columns, FromAbove
 
 Floats = NDArray[np.float32]
 
-# What a place that was looked through counts, against one that holds points. Free space must not decide alone: rays
-# cross hedges and hang over kerbs.
+# Weight of a free column, against 1 of an occupied one. Free space must not decide alone: rays cross hedges and pass
+# over kerbs; by hand.
 _FREE = np.float32(-0.15)
-# Standard deviation of the blur, in cells: half a cell of shift and half a step of yaw must not lose a wall.
+# Standard deviation of the blur, cells: half a cell of shift and half a step of yaw must not lose a wall; by hand.
 _BLUR = 0.7
 
 
@@ -29,7 +29,7 @@ def signed(view: FromAbove, turn: complex, n: int, cell: float) -> Floats:
 
 
 def blurred(evidence: Floats) -> Floats:
-    """The map with what is filled spread to the cells around, which then are less free."""
+    """The map with occupied cells spread to those around, which then are less free."""
     from scipy.ndimage import gaussian_filter
 
     filled = gaussian_filter((evidence > 0).astype(np.float32), (0.0, _BLUR, _BLUR), mode="wrap")

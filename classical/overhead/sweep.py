@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Where and how turned does one cloud, seen from above, fit another? All yaws, all shifts, by FFT."""
+"""Correlation of two clouds seen from above at all yaws and shifts, by FFT."""
 
 from __future__ import annotations
 
@@ -17,11 +17,13 @@ Array = NDArray[np.float64]
 Floats = NDArray[np.float32]
 Complexes = NDArray[np.complex64]
 
-# Yaws transformed at once, and the sectors in which a place keeps a best yaw of its own (a street turned round).
-_BATCH, _SECTORS = 4, 4
-# Cells along a map; time and memory go with their square.
+# Yaws transformed at once: for memory.
+_BATCH = 4
+# Sectors of yaw in which a shift keeps a best yaw of its own: a street may be turned round; by hand.
+_SECTORS = 4
+# Cells along a map, at most: time and memory grow with their square.
 _LONGEST = 512
-# Parts of a spectrum quieter than this share of its mean are noise, and not made louder.
+# Share of a spectrum's mean below which a part is noise, and is not amplified; by hand.
 _QUIET = 0.01
 
 

@@ -17,12 +17,13 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-_SOURCE, _TARGET = "#d95f02", "#3b6fb6"
+_SOURCE = "#d95f02"  # orange
+_TARGET = "#3b6fb6"  # blue
 _DRAWN = 30_000
 
 
 def before_after(path: str | os.PathLike[str], source: Array, target: Array, T: Array) -> None:
-    """Write a PNG: both clouds from above in the target's frame, as they came and aligned.
+    """Write a PNG: both clouds from above in the target's frame, before and after alignment.
 
     Parameters
     ----------
@@ -79,5 +80,5 @@ def draw_clouds(axes: Any, source: Array, target: Array, window: tuple[Array, Ar
 
 
 def thin(points: Array) -> Array:
-    """The points (N, 3), or some of them where a picture has no room for more."""
+    """The points (N, 3), or a subset where a picture cannot show more."""
     return points[:: max(1, len(points) // _DRAWN)]

@@ -26,11 +26,11 @@ _LATEX |= {
     "^": r"\textasciicircum{}",
 }
 
-_CONTROL_NOTE = f" Lines with{MARK} are controls and no methods: their overlap was taken from the truth."
+_CONTROL_NOTE = f" Rows with{MARK} are controls, not methods: their overlap was taken from the ground truth."
 
 
 def markdown(table: Table, protocols: Sequence[Protocol]) -> str:
-    """Every protocol's tables with their captions, then what the numbers hang on."""
+    """Every protocol's tables with their captions, then the conditions of the numbers."""
     parts = [f"# {table.title}"]
     for protocol in protocols:
         parts.append(f"## {protocol.name}\n\n{table.caption(protocol)} ({protocol.source}).")
@@ -43,10 +43,10 @@ def markdown(table: Table, protocols: Sequence[Protocol]) -> str:
 
 
 def fine_print(table: Table) -> str:
-    """What every number of a table hangs on."""
+    """The conditions that every number of a table depends on."""
     scenes = {scene_of(row) for entry in table.entries for row in entry.rows}
     return (
-        "Recall's interval is a 95 % bootstrap over scenes (a pair and its turned copies are drawn as one); "
+        "Recall's interval is a 95 % bootstrap over scenes (a pair and its random yaw rotations are drawn as one); "
         f"one of no width says that all {len(scenes)} scenes agree, which still leaves room for "
         f"{min(100.0, 300 / max(len(scenes), 1)):.0f} percentage points (the rule of three). A pair "
         "without a pose counts as the identity and never as a success. Seconds are wall time, one thread a pair; "

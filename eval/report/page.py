@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Pieces of an HTML page that needs nothing but itself: no network, no other file."""
+"""Pieces of a self-contained HTML page: no network, no other file."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from hybridreg.eval.report.table_columns import Cells
 
 
 def page(title: str, body: Sequence[str]) -> str:
-    """A whole page of pieces of HTML, with plotly's script inside."""
+    """A whole page from pieces of HTML, with plotly's script inside."""
     template = Template(files("hybridreg.eval.report").joinpath("page.html").read_text(encoding="utf-8"))
     # safe_substitute, because the page's own script holds template literals.
     return template.safe_substitute(title=escape(title), script=plotly_figures.script(), body="\n".join(body))
@@ -52,7 +52,7 @@ def filterable(lines: Sequence[Cells], *, success: str, text_from: str) -> str:
         "success": head.index(success),
         "text": head.index(text_from),
     }
-    # "</" would end the script element, "<!--<script" would keep it open, whatever the JSON says.
+    # "</" would end the script element, "<!--<script" would keep it open, whatever the JSON contains.
     stored = json.dumps(data).replace("<", "\\u003c")
     cells = "".join(f'<th data-key="{escape(key)}">{escape(key)}</th>' for key in head)
     return (

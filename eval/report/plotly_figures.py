@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Interactive figures for the HTML page, by plotly, which is imported when one is drawn."""
+"""Interactive figures for the HTML page, by plotly, imported when the first is drawn."""
 
 from __future__ import annotations
 
@@ -19,9 +19,12 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-# Points drawn of each cloud: enough to see walls and poles, few enough for a page with several views.
+# Points drawn per cloud: enough to see walls and poles, few enough for a page with several views.
 THINNED = 4000
-BEFORE, AFTER, TRUE, TARGET = "#999999", "#d95f02", "#1b9e77", "#3b6fb6"
+BEFORE = "#999999"  # grey
+AFTER = "#d95f02"  # orange
+TRUE = "#1b9e77"  # green
+TARGET = "#3b6fb6"  # blue
 
 
 def recall_curves(rows: Mapping[str, Sequence[Row]], protocol: Protocol) -> list[Figure]:
@@ -60,7 +63,7 @@ def confidence(rows: Mapping[str, Sequence[Row]], protocol: Protocol) -> Figure:
 
 
 def reliability(rows: Mapping[str, Sequence[Row]], protocol: Protocol) -> Figure:
-    """Share of successes among pairs of like confidence; on the diagonal it means what it says."""
+    """Reliability diagram: share of successes among pairs of similar confidence; calibrated on the diagonal."""
     from plotly.graph_objects import Figure
 
     figure = Figure()
@@ -99,7 +102,7 @@ def badness(rows: Sequence[Row], protocol: Protocol) -> Array:
 
 
 def clouds(source: Array, target: Array, T: Array, truth: Array | None = None) -> Figure:
-    """Both clouds in the target's frame: the source as it came, as it was aligned, and as the truth has it.
+    """Both clouds in the target's frame: the source before alignment, after it, and under the true pose.
 
     Parameters
     ----------
@@ -127,13 +130,13 @@ def thin(points: Array, n: int = THINNED) -> Array:
 
 
 def to_html(figure: Figure) -> str:
-    """A figure as a piece of a page that carries plotly's script itself."""
+    """A figure as a piece of a page that already contains plotly's script."""
     text: str = figure.to_html(full_html=False, include_plotlyjs=False, config={"displaylogo": False})
     return text
 
 
 def script() -> str:
-    """plotly's script, to be put into a page once."""
+    """plotly's script, to be included in a page once."""
     from plotly.offline import get_plotlyjs
 
     text: str = get_plotlyjs()

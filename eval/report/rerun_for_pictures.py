@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Pictures of a table's pairs: its pipelines are run once more on a few of them, with the same seed."""
+"""Pictures of a table's pairs: its pipelines are run again on a few of them, with the same seed."""
 
 from __future__ import annotations
 
@@ -35,8 +35,8 @@ def redraw(
 
     Returns
     -------
-    Files ``out/<line>/<pair>-matches.png`` of pipelines that make matches, and ``-mask.png`` of those whose overlap
-    stage leaves something out.
+    Files ``out/<line>/<pair>-matches.png`` of pipelines with matches, and ``-mask.png`` of those whose overlap stage
+    leaves points out.
 
     Raises
     ------

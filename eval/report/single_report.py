@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What `hybridreg register --out` leaves: one pair's pose, result, page and picture."""
+"""What `hybridreg register --out` writes: one pair's pose, result, page and picture."""
 
 from __future__ import annotations
 

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Pictures of what the stages of one run made: matches by correctness, and the overlap mask beside the photograph."""
+"""Pictures of what the stages of one run produced: matches by correctness, and the overlap mask beside the camera
+image."""
 
 from __future__ import annotations
 
@@ -18,8 +19,10 @@ from hybridreg.pipeline import Trace
 Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 
-RIGHT, WRONG, POINTS = "#1b9e77", "#d7301f", "#b8b8b8"
-# Kept and rightly so, kept wrongly, dropped wrongly, dropped and rightly so.
+RIGHT = "#1b9e77"  # green
+WRONG = "#d7301f"  # red
+POINTS = "#b8b8b8"  # grey
+# True positives, false positives, false negatives, true negatives of the mask.
 _KINDS = (
     ("kept, overlaps", RIGHT),
     ("kept, does not overlap", WRONG),
@@ -49,7 +52,7 @@ def draw_matches(axes: Any, trace: Trace, T_true: Array, inlier_m: float = 1.0) 
     Parameters
     ----------
     trace : of `Pipeline.trace`
-    T_true : (4, 4), source to target, between the clouds with their offsets taken off
+    T_true : (4, 4), source to target, between the clouds minus their offsets
     inlier_m : a match is right when it is off by less, metres
     """
     target, source = trace.scene.target.points, se3.apply(T_true, trace.scene.source.points)
@@ -106,7 +109,7 @@ def draw_masks(panels: Any, trace: Trace, T_true: Array, threshold: float = 0.5)
             note.partition("the ")[2] for note in scene.notes if note.startswith(f"{name}: the overlap mask")
         ]
         axes.set_xlabel(fallback[0].partition(" (")[0] if fallback else "x, m", fontsize=8)
-    _photograph(panels[2], scene.pair.image)
+    _image_panel(panels[2], scene.pair.image)
 
 
 def _kinds(axes: Any, points: Array, kept: Bools, true: Bools) -> None:
@@ -117,9 +120,9 @@ def _kinds(axes: Any, points: Array, kept: Bools, true: Bools) -> None:
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal", xlabel="x, m")
 
 
-def _photograph(axes: Any, image: NDArray[np.uint8] | None) -> None:
+def _image_panel(axes: Any, image: NDArray[np.uint8] | None) -> None:
     axes.set_axis_off()
-    axes.set_title("no photograph" if image is None else "photograph")
+    axes.set_title("no image" if image is None else "image")
     if image is not None:
         axes.imshow(image)
 

@@ -13,7 +13,7 @@ from hybridreg.eval.score.scoring import Score
 
 Cells = dict[str, str]
 
-# Shares of the source that the target saw too.
+# Shares of the source that the target's sensor saw too.
 _OVERLAPS = ((0.0, 0.3), (0.3, 0.6), (0.6, 1.01))
 
 
@@ -75,7 +75,7 @@ def stages(scores: Mapping[str, Score]) -> list[Cells]:
 
 
 def verdicts(name: str, rows: Sequence[Row], protocol: Protocol) -> Cells:
-    """How often each verdict was right: successes of the pairs that it was given to."""
+    """How often each verdict was right: successes among the pairs with it."""
     success = errors.of(rows).success(protocol)
     cells = {"method": name}
     for word in ("ok", "doubtful", "failed"):
@@ -85,7 +85,7 @@ def verdicts(name: str, rows: Sequence[Row], protocol: Protocol) -> Cells:
 
 
 def by_overlap(name: str, rows: Sequence[Row], protocol: Protocol) -> Cells:
-    """Recall among pairs of low, middle and high overlap."""
+    """Recall among pairs of low, medium and high overlap."""
     success = errors.of(rows).success(protocol)
     cells = {"method": name}
     for low, high in _OVERLAPS:

@@ -140,7 +140,7 @@ def _views(table: Table, protocol: Protocol, pairs: Sequence[LabelledPair] | Non
         yield page.paragraph(_told(row))
         try:
             pair = pairs[ids.index(row.id)].pair
-        except (OSError, ValueError) as error:  # data that went bad since must not cost the report
+        except (OSError, ValueError) as error:  # data that was damaged since must not prevent the report
             yield page.paragraph(f"There is no view: {one_line(error)}")
             continue
         yield plotly_figures.to_html(

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: MIT
-"""Running methods over a data set, and what is kept of it."""
+"""Running methods over a data set, and what is stored."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""One method on one pair. No truth comes in here."""
+"""One method on one pair, without access to the true pose."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from hybridreg.runtime.resources import peak_memory_mb, reset_peak_memory
 
 @runtime_checkable
 class Traceable(Protocol):
-    """A method that shows what its stages made: `hybridreg.Pipeline`, or anything that does as it does."""
+    """A method that exposes what its stages produced: `hybridreg.Pipeline`, or anything with the same interface."""
 
     def trace(self, pair: Pair, *, seed: int = 0) -> Trace: ...
 
@@ -32,7 +32,7 @@ Method = Traceable | Callable[[Pair, int], Any]
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Attempt:
-    """What a method made of a pair."""
+    """What a method returned for a pair."""
 
     T: Any
     seconds: dict[str, float]
@@ -69,7 +69,7 @@ def _traced(method: Traceable, pair: Pair, seed: int) -> Attempt:
     trace = method.trace(pair, seed=seed)
     result = method.conclude(trace, seed=seed)
     return Attempt(
-        # A pose that was not found is the identity, which near-by pairs would count as right.
+        # A pose that was not found is the identity, which would count as right for nearby pairs.
         T=result.transformation if trace.refined.found else None,
         T_estimated=raise_pose(trace.estimated.T, pair) if trace.estimated.found else None,
         seconds=dict(result.seconds),

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Controls of an ablation: a pipeline that is told what no method may know, or kept from what it may see.
+"""Controls of an ablation: a pipeline that gets the true overlap, or that does not get the image.
 
-The truth stays within the evaluator: `predict` hands the labelled pair to the control, which gives back a pipeline for
-this one pair. The stage that answers from the truth is not registered, so no pipeline file can name it.
+The true pose stays within the evaluator: `predict` gives the labelled pair to the control, which returns a pipeline
+for this one pair. The stage that uses the true pose is not registered, so no pipeline file can name it.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from hybridreg.scene import Scene
 
 Array = NDArray[np.float64]
 
-# Behind the name of a line that is no method.
+# Appended to the name of a row that is not a method.
 MARK = " †"
 
 
@@ -35,7 +35,7 @@ class Control:
     Attributes
     ----------
     oracle : replace its overlap stage by the true overlap
-    image : let it see the photograph
+    image : let it use the camera image
     """
 
     pipeline: Pipeline
@@ -47,7 +47,7 @@ class Control:
         return {**self.pipeline.to_spec(), "control": {"oracle": self.oracle, "image": self.image}}
 
     def told(self, labelled: LabelledPair) -> tuple[Pipeline, Pair]:
-        """The pipeline for this pair, and the pair as it may be seen."""
+        """The pipeline for this pair, and the pair as the pipeline may see it."""
         pipeline, pair = self.pipeline, labelled.pair
         if self.oracle:
             pipeline = pipeline.swap(overlap=TrueOverlap(T=lower_pose(labelled.T_target_source, pair)))
@@ -56,7 +56,7 @@ class Control:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class TrueOverlap:
-    """The overlap as the truth has it: points with a point of the other level nearby.
+    """The overlap under the true pose: points with a point of the other level nearby.
 
     Attributes
     ----------
@@ -66,7 +66,7 @@ class TrueOverlap:
     T: Array
 
     def __call__(self, scene: Scene) -> Overlap:
-        scene.note("control: the overlap was taken from the truth, this is no method")
+        scene.note("control: the overlap was taken from the ground truth, this is not a method")
         source, target = true_overlap(scene, self.T)
         return Overlap(source.astype(float), target.astype(float))
 

@@ -16,9 +16,9 @@ FORMAT = "hybridreg predictions 1"
 
 
 def fingerprint_under(path: str | os.PathLike[str], seen: str) -> str | None:
-    """The data's fingerprint that a file of predictions was begun with, where the data's files look the same as then.
+    """The data's fingerprint in a file of predictions, where the data's files look the same as when it was written.
 
-    None where they do not, or where there is no such file: the fingerprint must be made of the content.
+    None where they do not, or where there is no such file: the fingerprint must then be computed from the content.
     """
     try:
         with Path(path).open("rb") as file:
@@ -33,7 +33,7 @@ def fingerprint_under(path: str | os.PathLike[str], seen: str) -> str | None:
 
 
 def whole_lines(path: Path) -> tuple[list[str], int]:
-    """The finished lines of a file, and how many bytes they take.
+    """The complete lines of a file, and their number of bytes.
 
     Raises
     ------
@@ -49,7 +49,7 @@ def whole_lines(path: Path) -> tuple[list[str], int]:
 
 
 def refuse_foreign(path: Path) -> None:
-    """A file without one whole line may be replaced only if it is the beginning of a header.
+    """Refuse a file without a complete line, unless it is the beginning of a header.
 
     Raises
     ------
@@ -62,7 +62,7 @@ def refuse_foreign(path: Path) -> None:
 
 
 def header_of(line: str, path: str | os.PathLike[str]) -> dict[str, Any]:
-    """What the first line tells: `config`, and perhaps `seen`.
+    """The first line: `config`, and perhaps `seen`.
 
     Raises
     ------

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A file that grows by whole lines, each on the disk before the next."""
+"""A file that grows by whole lines, each on disk before the next."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from hybridreg.io.faults import naming
 
 
 class LineFile:
-    """Appends lines to `path`; a line that does not fit on the disk leaves no half behind.
+    """Appends lines to `path`; a line that does not fit on the disk leaves no partial line behind.
 
     Raises
     ------
@@ -36,7 +36,7 @@ class LineFile:
                     left = left[os.write(self._handle, left) :]
                 os.fsync(self._handle)
             except BaseException as error:
-                # Whole but interrupted before it was flushed, it may stay.
+                # A line that is complete but was interrupted before the flush may stay.
                 if left or isinstance(error, OSError):
                     os.ftruncate(self._handle, before)
                 raise

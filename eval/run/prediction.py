@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Run a method over a data set, once: rows go to disk as they are done, a broken run goes on from there."""
+"""Run a method over a data set once: rows are stored as they finish, an interrupted run continues from there."""
 
 from __future__ import annotations
 
@@ -35,14 +35,14 @@ def predict(
     data: str = "",
     on_row: Callable[[Row], None] | None = None,
 ) -> list[Row]:
-    """Rows of every pair, from the file where it has them, else computed and appended to it.
+    """Rows of every pair, from the file where it has them, otherwise computed and appended to it.
 
     Parameters
     ----------
     method : Pipeline, or a function of (pair, seed) that returns a 4x4 pose, a RegistrationResult or None; or a
-        control of an ablation, which alone is told the truth
+        control of an ablation, which alone is given the true pose
     pairs : sequence of LabelledPair
-        With more than one worker it travels to them pickled, so it should read its pairs lazily.
+        With more than one worker it is sent to them pickled, so it should read its pairs lazily.
     path : file to write
     seed : int
         With a pair's id it fixes all randomness, so that neither order nor workers change a row.
@@ -50,9 +50,9 @@ def predict(
         Processes, each with one thread; pairs at a time where another backend runs them. None takes what
         `joblib.parallel_config` says, else 1: under `joblib.parallel_config(backend="dask")` the pairs spread over a
         cluster, and those of a lost machine are done by the others. A pair that kills its process is a failed row with
-        two or more workers; with one it takes this process along, and on dask joblib (1.6) waits for it for ever.
+        two or more workers; with one it ends this process too, and with dask joblib (1.6) waits for it forever.
     overwrite : bool
-        Begin anew, whatever the file holds.
+        Start over, whatever the file holds.
     data : str
         The data set's name, for reports.
     on_row : called with each row, old ones included
@@ -60,10 +60,10 @@ def predict(
     Raises
     ------
     ValueError
-        The file was made by another configuration or version, of data or weights whose content is another; it is being
+        The file was made by another configuration or version, of data or weights with another content; it is being
         written by another process; or two pairs share an id.
     ImportError
-        A package that the method or the data need is not here; what was never run is no failed row.
+        A package that the method or the data need is not here; what was never run is not a failed row.
     OSError
         The file cannot be written.
     """
@@ -112,7 +112,7 @@ def describe(method: Any) -> dict[str, Any]:
 
 
 def weights_of(described: Any) -> dict[str, str]:
-    """A hash of the weights of one's own that a method names, by their folder or file; those of the wheel are told by
+    """A hash of the user's own weights that a method names, by folder or file; those in the wheel are identified by
     the version."""
     if not isinstance(described, Mapping):
         return {}
@@ -162,7 +162,7 @@ def _rows(
             left.discard(row.index)
             yield row
     except TerminatedWorkerError:
-        # Some pair killed its process and took others along. Alone in a process each, the others go through.
+        # Some pair killed its process and others with it. Each alone in a process, the others succeed.
         yield from _one_by_one(method, pairs, ids, sorted(left), seed)
 
 
@@ -174,7 +174,7 @@ def _parallel(
     seed: int,
     workers: int | None,
 ) -> Iterator[Row]:
-    # One pair a task, so that a row is on the disk as soon as it is done.
+    # One pair a task, so that a row is on disk as soon as it is done.
     jobs = ((method, pairs, index, ids[index], seed) for index in indices)
     return spread(predict_pair, jobs, workers, singly=True)
 

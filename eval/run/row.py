@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What is stored of one pair: all that scoring needs, so that a run is done once and scored often."""
+"""What is stored of one pair: everything that scoring needs, so that a run is done once and scored often."""
 
 from __future__ import annotations
 
@@ -26,12 +26,12 @@ class Row:
 
     Attributes
     ----------
-    index, id : place and name of the pair in its data set
+    index, id : index and name of the pair in its data set
     T : 4x4 or None
         The pose found, source to target; None where the method failed or found nothing. Poses here are
-        between the clouds with their `offsets` taken off, which are None except on map grids.
+        between the clouds minus their `offsets`, which are None except on map grids.
     T_estimated : 4x4 or None
-        The pose before refinement, where the method tells it.
+        The pose before refinement, where the method gives it.
     error : str or None
         What the method raised, in one line.
     verdict, confidence, reasons, evidence, notes
@@ -42,7 +42,7 @@ class Row:
     n_points : points of "source", "target" and of the downsampled "source_level", "target_level"
     T_true : 4x4 or None
         None where the pair itself could not be read.
-    overlap : share of source points that the target saw too, under the truth, within `overlap_radius` metres
+    overlap : share of source points with a target point within `overlap_radius` metres under the true pose
     moments : 4x4
         Second moments of those source points (`metrics.second_moments`).
     inlier_ratio : share of right matches by radius in metres, as text, before the matcher's filters
@@ -86,22 +86,22 @@ class Row:
         Raises
         ------
         ValueError
-            The text is no row, or a value is not of its field's type.
+            The text is not a row, or a value is not of its field's type.
         """
         row = build(cls, parse_json(text, "not a row of predictions"), "not a row of predictions")
         for name in _MATRICES:
             if getattr(row, name) is not None and matrix(getattr(row, name)) is None:
-                raise ValueError(f"not a row of predictions: {name} is no finite 4x4 matrix")
+                raise ValueError(f"not a row of predictions: {name} is not a finite 4x4 matrix")
         return row
 
     @property
     def timeless(self) -> dict[str, Any]:
-        """All but times and memory, which alone may differ between two runs of one configuration."""
+        """Everything but times and memory, which alone may differ between two runs of one configuration."""
         return {key: value for key, value in asdict(self).items() if key not in ("seconds", "peak_memory_mb")}
 
 
 def matrix(T: Any) -> Matrix | None:
-    """A pose as nested lists, or None where it is no finite 4x4 matrix."""
+    """A pose as nested lists, or None where it is not a finite 4x4 matrix."""
     try:
         array: Array = np.asarray(T, dtype=np.float64)
     except (TypeError, ValueError):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Predictions on disk: a line that tells the configuration, then one line a pair, appended as it is done."""
+"""Predictions on disk: one line with the configuration, then one line a pair, appended as it finishes."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from hybridreg.io.atomic import write_text
 from hybridreg.io.faults import naming
 from hybridreg.io.lock import file_lock
 
-_CURE = "add --overwrite to make it anew, or choose another --out"
+_CURE = "add --overwrite to start over, or choose another --out"
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,7 +28,7 @@ class Predictions:
 
     Attributes
     ----------
-    config : what made the rows: the method's spec, the data, the seed
+    config : how the rows were made: the method's spec, the data, the seed
     rows : in the order of the data set
     """
 
@@ -37,14 +37,14 @@ class Predictions:
 
 
 def read(path: str | os.PathLike[str]) -> Predictions:
-    """Read a file of predictions; a last line that was cut off by a crash is left out.
+    """Read a file of predictions; a last line that was truncated by a crash is left out.
 
     Raises
     ------
     FileNotFoundError
         No such file.
     ValueError
-        No such file's content, or a broken line before the last.
+        The content is something else, or a line before the last is broken.
     """
     if not Path(path).is_file():
         raise FileNotFoundError(
@@ -67,19 +67,19 @@ def read(path: str | os.PathLike[str]) -> Predictions:
 class Appender:
     """Opens a file of predictions to add rows.
 
-    The file is locked until the block ends. Where somebody deletes it in the meantime it is made again, whole.
+    The file is locked until the block ends. If it is deleted in the meantime it is written again, whole.
 
     Parameters
     ----------
     ids : names of all pairs; with them a file that has all rows is neither locked nor touched
-    seen : what the data's files looked like (`hybridreg.data.dataset.looks_of`), kept beside the configuration
+    seen : what the data's files looked like (`hybridreg.data.dataset.looks_of`), stored with the configuration
 
     Raises
     ------
     InUse
         Another process is writing it.
     ValueError
-        The file was made by another configuration, or is damaged; the message tells what differs.
+        The file was made by another configuration, or is damaged; the message says what differs.
     OSError
         It cannot be written; the message names it.
     """
@@ -147,7 +147,7 @@ class Appender:
     def _opened(self, *, anew: bool) -> LineFile:
         whole = whole_lines(self.path)[1] if self.path.exists() and not anew else 0
         if whole:
-            # What follows the last whole line is half a row of a run that was cut off.
+            # What follows the last complete line is a partial row of an interrupted run.
             with naming(self.path):
                 os.truncate(self.path, whole)
             return LineFile(self.path, anew=False)
@@ -156,7 +156,7 @@ class Appender:
         return file
 
     def _present(self) -> LineFile:
-        # The open file, made again where it was deleted.
+        # The open file, recreated where it was deleted.
         assert self._file is not None
         if not self._file.is_there():
             self.path.parent.mkdir(parents=True, exist_ok=True)

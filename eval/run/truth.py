@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The truth joined to what a method made, after it has returned."""
+"""Adds the ground truth to a method's result, after the method has returned."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from hybridreg.pair import LabelledPair, Pair
 from hybridreg.pipeline import Trace
 from hybridreg.resolution import default_voxel
 
-# More source points than this change the overlap's measure in the third digit only.
+# More source points than this change the measured overlap only in the third digit.
 _SAMPLE = 10_000
 
 

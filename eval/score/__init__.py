@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: MIT
-"""From kept rows to scores."""
+"""From stored rows to scores."""

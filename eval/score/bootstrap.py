@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""How sure a mean over few pairs is."""
+"""Confidence intervals of means over few pairs."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def interval(
 ) -> tuple[float, float]:
     """Percentile bootstrap interval of the mean of `values` (n,).
 
-    Whole groups are drawn, because a pair and its turned copies share a scene: drawn one by one they would
+    Whole groups are drawn, because a pair and its random yaw rotations share a scene: drawn individually they would
     make the interval too narrow. Values that are not finite are left out.
     """
     keep = np.isfinite(values)

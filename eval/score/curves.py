@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Recall as one threshold moves and the other stays."""
+"""Recall as one threshold varies and the other stays fixed."""
 
 from __future__ import annotations
 

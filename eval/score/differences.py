@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Is one method better than another? Pair by pair on the same pairs, with an interval."""
+"""Whether one method is better than another: paired differences on the same pairs, with an interval."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 
 
 class Difference(NamedTuple):
-    """Mean of one method's measure less the other's, and its bootstrap 95 % interval over scenes."""
+    """Mean of one method's measure minus the other's, and its bootstrap 95 % interval over scenes."""
 
     mean: float
     low: float
@@ -35,7 +35,7 @@ def difference(ours: Array, theirs: Array, scenes: Sequence[str]) -> Difference:
 
 
 def cells(name: str, rows: Sequence[Row], first: Sequence[Row], protocol: Protocol) -> Cells:
-    """A line of differences to the first method, percentage points; only pairs that both could read count."""
+    """A row of differences to the first method, percentage points, over pairs that both could read."""
     theirs = {row.id: row for row in first if row.T_true is not None}
     mine = [row for row in rows if row.id in theirs and row.T_true is not None]
     other = [theirs[row.id] for row in mine]

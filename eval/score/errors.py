@@ -28,7 +28,7 @@ class Errors:
     rre_deg, rte_m, rmse_m : (n,)
         NaN where the pair has no truth because it could not be read.
     failed : (n,) bool
-        No pose was found. Such a row is measured with the identity and never succeeds.
+        No pose was found. Such a row is scored with the identity and never succeeds.
     """
 
     rre_deg: Array
@@ -52,7 +52,7 @@ class Errors:
 
 def of(rows: Sequence[Row], step: Step = "refined") -> Errors:
     """Errors of rows, after refinement or of the estimate before it."""
-    # A method may have returned numbers beyond any world: its errors are then infinite, or NaN, and no success.
+    # A method may have returned absurd numbers: its errors are then infinite, or NaN, and it does not succeed.
     with np.errstate(over="ignore", invalid="ignore"):
         measured = np.array([_errors(row, step) for row in rows], dtype=np.float64).reshape(-1, 4)
     return Errors(measured[:, 0], measured[:, 1], measured[:, 2], measured[:, 3] > 0.0)

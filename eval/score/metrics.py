@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Measures of one pair: how far a pose, a set of matches or a mask is from the truth."""
+"""Measures of one pair: errors of a pose, a set of matches or a mask against the ground truth (docs/methods.md 1.2,
+1.3)."""
 
 from __future__ import annotations
 
@@ -22,13 +23,13 @@ def rre_deg(T: Array, truth: Array) -> float:
 def rte_m(T: Array, truth: Array) -> float:
     """Relative translation error `|t - t_true|`, metres, of two 4x4 poses.
 
-    Both must be poses between the raw sensor frames: after centring the clouds it would be another number.
+    Both must be poses between the raw sensor frames: centring the clouds would change the number.
     """
     return float(np.linalg.norm(T[:3, 3] - truth[:3, 3]))
 
 
 def inlier_ratio(source: Array, target: Array, truth: Array, radius: float) -> float:
-    """Share of matches, rows of `source` and `target` (K, 3), that the truth brings within `radius` metres.
+    """Share of matches, rows of `source` and `target` (K, 3), that the true pose brings within `radius` metres.
 
     Strictly within; 0 where there are no matches.
     """
@@ -38,7 +39,7 @@ def inlier_ratio(source: Array, target: Array, truth: Array, radius: float) -> f
 
 
 def match_residuals(source: Array, target: Array, truth: Array) -> Array:
-    """Distances (K,) in metres that the truth leaves between matched points."""
+    """Residuals (K,) in metres of the matches under the true pose."""
     residuals: Array = np.linalg.norm(se3.apply(truth, source) - target, axis=1)
     return residuals
 
@@ -54,7 +55,7 @@ def rmse_m(T: Array, truth: Array, moments: Array) -> float:
     """Root mean square of `|T p - T_true p|` over the points behind `moments` (4, 4), metres.
 
     With the points of the true overlap this is the registration RMSE of the 3DMatch benchmark; the quadratic
-    form `tr(D M D^T)`, `D = T - T_true`, lets it be computed long after the points are gone.
+    form `tr(D M D^T)`, `D = T - T_true`, allows computing it after the points are gone.
     """
     difference = (T - truth)[:3]
     return float(np.sqrt(max(np.trace(difference @ moments @ difference.T), 0.0)))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Figures as somebody printed them, on their own data: a table of its own, never columns of ours."""
+"""Published figures, on their authors' data: a separate table, never columns of ours."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class Printed:
     rows: Mapping[str, tuple[float, ...]]
 
     def heading(self) -> str:
-        """What the table is, so that nobody takes it for ours."""
+        """What the table is, so that nobody mistakes it for ours."""
         return f"As printed in {self.source}, measured on {self.data}: not comparable with the tables above"
 
     def cells(self) -> list[Cells]:

@@ -1,28 +1,28 @@
 # SPDX-License-Identifier: MIT
-"""Named rules of scoring: when a pair counts as a success, and over which pairs an error is averaged."""
+"""Evaluation protocols: when a pair counts as a success, and over which pairs an error is averaged."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import Literal
 
-# Over all pairs; over successes; each error over the pairs that meet its own threshold alone.
+# Over all pairs; over successes; each error over the pairs that meet its own threshold.
 Average = Literal["all", "success", "criterion"]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Protocol:
-    """One rule of scoring.
+    """One evaluation protocol (docs/methods.md 1.4).
 
     Attributes
     ----------
     rre_deg, rte_m : float
         A success has smaller errors than these, strictly.
     inlier_m : float
-        A match is right when the truth brings it within this distance, metres.
+        A match is an inlier when its residual under the true pose is below this, metres.
     average : which pairs the two headline errors are averaged over
     rmse_m : float or None
-        Where given, a success is an RMSE over the overlap smaller than this, and the angles only describe.
+        Where given, a success is an RMSE over the overlap smaller than this; the other errors are only reported.
     source : str
         Where the rule comes from.
     """
@@ -86,10 +86,10 @@ _ALL = (
 
 PROTOCOLS = {protocol.name: protocol for protocol in _ALL}
 
-# Distances at which the share of right matches is stored, so that every protocol can be scored later.
+# Radii at which the inlier ratio is stored, so that every protocol can be scored later.
 INLIER_RADII = (0.05, 0.1, 0.2, 0.3, 0.5, 0.6, 1.0, 2.0)
 
-# Recall is always told at these, whatever the protocol.
+# Recall is always reported at these, whatever the protocol.
 RECALL_AT = ((2.0, 0.5), (5.0, 2.0), (5.0, 0.6))
 
 

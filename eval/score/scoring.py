@@ -17,7 +17,7 @@ from hybridreg.eval.score.protocols import RECALL_AT, Protocol
 Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 
-# A pair's features are called matched when this share of its matches is right (FMR).
+# A pair counts as matched at this inlier ratio (FMR).
 _MATCHED = 0.05
 
 
@@ -116,12 +116,12 @@ def score(rows: Sequence[Row], protocol: Protocol) -> Score:
 
 
 def scene_of(row: Row) -> str:
-    """Name of the pair that a row's turned copies come from."""
+    """Name of the pair that a row's random yaw rotations come from."""
     return row.id.partition("@")[0]
 
 
 def identity(rows: Sequence[Row]) -> list[Row]:
-    """Rows of the method that does nothing, on the same pairs: what a failure on near-by pairs looks like."""
+    """Rows of the identity pose on the same pairs: what a failure on nearby pairs looks like."""
     eye = np.eye(4).tolist()
     return [
         Row(index=r.index, id=r.id, T=eye if r.T_true else None, T_true=r.T_true, overlap=r.overlap,
@@ -152,7 +152,7 @@ def inlier_ratios(rows: Sequence[Row], protocol: Protocol, *, filtered: bool = F
 
 
 def mean_seconds(rows: Sequence[Row]) -> dict[str, float]:
-    """Mean seconds of each stage over the rows that ran it, and of the whole."""
+    """Mean seconds of each stage over the rows that ran it, and in total."""
     stages = dict.fromkeys(stage for row in rows for stage in row.seconds)
     return {stage: float(np.mean([r.seconds[stage] for r in rows if stage in r.seconds])) for stage in stages}
 

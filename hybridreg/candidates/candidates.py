@@ -149,9 +149,10 @@ class Candidates(Stage):
             try:
                 pose = _pose(entry, scene, matches, own)
             except (ImportError, MissingWeights) as error:
-                problem = _left_out(entry, scene, error)
+                pose, problem = Pose.unknown(), _left_out(entry, scene, error)
                 missing.append(problem)
-                pose = Pose.unknown()
+            except (ValueError, OSError) as error:
+                pose, problem = Pose.unknown(), _left_out(entry, scene, error)
             if pose.found and np.isfinite(pose.T).all():
                 here = [one.but(came_from=name) for one in best_first(scene, _starts(scene, pose))]
                 offered.append(here)
@@ -258,19 +259,14 @@ def _check(entry: Entry) -> None:
 
 
 def _pose(entry: Entry, scene: Scene, matches: Correspondences, rng: np.random.Generator) -> Pose:
-    try:
-        for stage in entry.values():
-            fitting.check_stage_image(stage, scene.pair)
-        if "match" in entry:
-            overlap = _overlap(entry, scene)
-            with scene.clock.phase("match"):
-                matches = scene.matched(entry["match"](scene, overlap))
-        return entry["estimate"](scene, matches, rng)
-    except MissingWeights:
-        raise
-    except (ValueError, OSError) as error:
-        _left_out(entry, scene, error)
-        return Pose.unknown()
+    for stage in entry.values():
+        fitting.check_stage_image(stage, scene.pair)
+    if "match" in entry:
+        overlap = _overlap(entry, scene)
+        with scene.clock.phase("match"):
+            matches = scene.matched(entry["match"](scene, overlap))
+    found: Pose = entry["estimate"](scene, matches, rng)
+    return found
 
 
 def _overlap(entry: Entry, scene: Scene) -> Overlap:

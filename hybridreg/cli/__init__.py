@@ -12,12 +12,12 @@ def main(arguments: Sequence[str] | None = None) -> None:
     signal n."""
     try:
         from hybridreg.cli.app import app
-        from hybridreg.cli.console import make_ready
+        from hybridreg.cli.terminal.console import make_ready
     except (
         ImportError,
         MemoryError,
         OSError,
-    ) as error:  # too little memory for the imports alone, or half an install
-        sys.exit(f"hybridreg: {' '.join(str(error).split()) or 'the memory is not enough'}")
+    ) as error:  # too little memory even for the imports, or a broken installation
+        sys.exit(f"hybridreg: {' '.join(str(error).split()) or 'not enough memory'}")
     make_ready()
     app(None if arguments is None else list(arguments))

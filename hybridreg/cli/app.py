@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The commands, gathered."""
+"""The command line application and its commands."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import typer
 
 import hybridreg
 from hybridreg.cli import (
+    batch,
     datasets,
     demo,
     doctor,
@@ -24,7 +25,7 @@ from hybridreg.cli import (
 
 app = typer.Typer(
     name="hybridreg",
-    help="Register point clouds from different sensors, and score pipelines that do.",
+    help="Register point clouds from different sensors, and evaluate registration pipelines.",
     no_args_is_help=True,
     add_completion=False,
     pretty_exceptions_enable=False,
@@ -47,6 +48,7 @@ def _common(
 
 
 app.command("register")(register.command)
+app.command("batch")(batch.command)
 app.command("eval")(evaluate.command)
 app.command("table")(table.command)
 app.command("report")(report.command)

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from hybridreg.cli import options
-from hybridreg.cli.error_messages import plainly
-from hybridreg.cli.stop_signals import going_on
+from hybridreg.cli.terminal.error_messages import plainly
+from hybridreg.cli.terminal.stop_signals import going_on
 
 if TYPE_CHECKING:
     from hybridreg.data.summary import Array, Summary
@@ -38,7 +38,7 @@ def inspect(
     data: Annotated[str, typer.Argument(help="Folder in a known layout, or name:rest of a loader.")],
     pairs: Annotated[int, typer.Option(min=1, help="Pairs to read, spread over the set.")] = 50,
 ) -> None:
-    """Tell fields, sensors, motions and overlaps; ends with 2 if the poses map target to source."""
+    """Print fields, sensors, motions and overlaps; exit code 2 if the poses map target to source."""
     from hybridreg.data import open_dataset
     from hybridreg.data.summary import summarise
 
@@ -56,10 +56,10 @@ def kitti_list(
     split: Annotated[str, typer.Option(help="train, val or test.")] = "test",
     workers: options.Workers = 1,
 ) -> None:
-    """Make KITTI's pairs anew: the field's walk, and ICP composed as T_icp @ M; takes seconds a pair."""
+    """Make KITTI's list of pairs: the usual frame spacing, with ICP composed as T_icp @ M; takes seconds a pair."""
     from hybridreg.data.lists import kitti_list as listing
 
-    with going_on(lambda: "nothing is written before the last pair: the same command begins anew"):
+    with going_on(lambda: "nothing is written before the last pair: the same command starts over"):
         print(f"written to {listing.write(root, split, workers)}")
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""`hybridreg doctor`: what is installed, what loads, and what to do about what does not."""
+"""`hybridreg doctor`: what is installed, what loads, and how to fix what does not."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import platform
 from collections.abc import Iterator
 from importlib.metadata import PackageNotFoundError, version
 
-from hybridreg.cli.error_messages import plainly, sentence
+from hybridreg.cli.terminal.error_messages import plainly, sentence
 
 # Module to distribution; what each is needed for.
 _NEEDED = {
@@ -32,7 +32,7 @@ _NEEDED = {
 
 @plainly
 def command() -> None:
-    """Tell versions, which libraries load, and whether there is a GPU."""
+    """Print versions, which libraries load, and whether there is a GPU."""
     import hybridreg
 
     print(f"hybridreg {hybridreg.__version__}, Python {platform.python_version()}, {platform.platform()}")
@@ -58,7 +58,7 @@ def _loads(module: str) -> str:
             load_open3d()
         else:
             importlib.import_module(module)
-    except Exception as error:  # whatever a library raises when it cannot load, the others are still told
+    except Exception as error:  # whatever a library raises when it cannot load, the others are still reported
         return f"does not load: {sentence(error)}"
     return "loads"
 

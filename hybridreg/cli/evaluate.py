@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from hybridreg.cli import options
-from hybridreg.cli.error_messages import plainly
+from hybridreg.cli.terminal.error_messages import plainly
 
 
 @plainly
@@ -20,13 +20,15 @@ def command(
     settings: options.Settings = None,
     voxel: options.Voxel = None,
     protocols: options.Protocols = None,
-    starts: Annotated[int, typer.Option(min=0, help="Repeat each pair under so many random yaws.")] = 0,
+    starts: Annotated[
+        int, typer.Option(min=0, help="Repeat each pair under this many random yaw rotations.")
+    ] = 0,
     seed: options.Seed = 0,
     workers: options.Workers = 1,
     out: Annotated[Path | None, typer.Option(help="Folder; runs/<pipeline> if not given.")] = None,
     overwrite: options.Overwrite = False,
 ) -> None:
-    """Predict the poses of a data set once, and score them; a run that was cut off goes on where it stood."""
+    """Predict the poses of a data set once, and score them; an interrupted run continues where it stopped."""
     from hybridreg.cli import table_running
     from hybridreg.eval import table_file
     from hybridreg.presets import DEFAULT

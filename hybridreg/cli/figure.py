@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from hybridreg.cli.error_messages import plainly
+from hybridreg.cli.terminal.error_messages import plainly
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""`hybridreg list`: what can be named."""
+"""`hybridreg list`: the names of stages, presets, data sets, tables, protocols, recipes and networks."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from hybridreg.cli.error_messages import plainly
+from hybridreg.cli.terminal.error_messages import plainly
 
 
 class Kind(str, Enum):
@@ -34,7 +34,7 @@ def command(kind: Annotated[Kind | None, typer.Argument(help="All kinds if not g
 
 
 def lines(kind: Kind) -> Iterator[str]:
-    """The names of one kind, each with what it stands for."""
+    """The names of one kind, each with its meaning."""
     from hybridreg import presets, registry
     from hybridreg.data import catalogue
     from hybridreg.eval import table_file
@@ -65,7 +65,7 @@ def _networks() -> Iterator[tuple[str, str]]:
     for name in NETWORKS:
         try:
             yield name, ", ".join(network_class(name).sizes)
-        except ImportError as error:  # torch may be what is missing: the other kinds are listed all the same
+        except ImportError as error:  # torch may be missing: the other kinds are listed all the same
             yield name, f"does not load: {error}"
 
 

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 import typer
 
-Preset = Annotated[str | None, typer.Option(help="Pipeline by name; `hybridreg list presets` tells them.")]
+Preset = Annotated[str | None, typer.Option(help="Pipeline by name; see `hybridreg list presets`.")]
 PipelineFile = Annotated[Path | None, typer.Option(help="Pipeline as a TOML file, instead of a preset.")]
 Settings = Annotated[
     list[str] | None,
@@ -17,10 +17,10 @@ Settings = Annotated[
 Voxel = Annotated[float | None, typer.Option(help="Voxel, metres; derived from the clouds if not given.")]
 Seed = Annotated[int, typer.Option(help="Fixes every random choice.")]
 Protocols = Annotated[
-    list[str] | None, typer.Option("--protocol", help="Rule of scoring by name; repeatable.")
+    list[str] | None, typer.Option("--protocol", help="Evaluation protocol by name; repeatable.")
 ]
 Workers = Annotated[int, typer.Option(min=1, help="Processes, each with one thread.")]
-Overwrite = Annotated[bool, typer.Option("--overwrite", help="Run anew what the folder already holds.")]
+Overwrite = Annotated[bool, typer.Option("--overwrite", help="Run again what the folder already holds.")]
 
 Topic = Annotated[str | None, typer.Option(help="Of a bag; `source's,target's` where they differ.")]
 Index = Annotated[
@@ -40,7 +40,7 @@ Format = Annotated[
 ]
 Viewpoint = Annotated[
     str,
-    typer.Option(metavar="x,y,z|none|auto", help="Where its sensor stood, metres in the cloud's own frame."),
+    typer.Option(metavar="x,y,z|none|auto", help="Position of its sensor, metres in the cloud's own frame."),
 ]
 
 Init = Annotated[Path | None, typer.Option(help="A rough pose: a file of a 4x4 matrix, or a result.json.")]
@@ -136,7 +136,7 @@ def selections(
 
 
 def viewpoint(text: str, option: str) -> Any:
-    """What `PointCloud.of` takes, of `x,y,z`, `none` or `auto`."""
+    """The viewpoint for `PointCloud.of` from `x,y,z`, `none` or `auto`."""
     if text in ("auto", "none"):
         return text
     try:

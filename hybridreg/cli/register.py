@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from hybridreg.cli import options
-from hybridreg.cli.command_line_cures import spoken
-from hybridreg.cli.error_messages import VERDICT_FAILED, plainly
+from hybridreg.cli.terminal.command_line_cures import spoken
+from hybridreg.cli.terminal.error_messages import VERDICT_FAILED, plainly
 
 if TYPE_CHECKING:
     from hybridreg.cloud import PointCloud
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 class NonFinite(str, Enum):
-    """What to do with points that are not finite."""
+    """How points that are not finite are treated."""
 
     refuse = "raise"
     drop = "drop"
@@ -29,7 +29,7 @@ class NonFinite(str, Enum):
 def command(
     source: Annotated[Path, typer.Argument(help="The cloud that moves: ply, pcd, npy, las, e57, a bag ...")],
     target: Annotated[Path, typer.Argument(help="The cloud that stays.")],
-    image: Annotated[Path | None, typer.Option(help="A photograph of the common view.")] = None,
+    image: Annotated[Path | None, typer.Option(help="A camera image of the common view.")] = None,
     preset: options.Preset = None,
     pipeline: options.PipelineFile = None,
     settings: options.Settings = None,
@@ -56,7 +56,7 @@ def command(
     crop_source: options.CropSource = None,
     scale: options.Scale = False,
 ) -> None:
-    """Align two point clouds; print the pose, whether to believe it, and the seconds of each stage."""
+    """Align two point clouds; print the pose, the verdict on it, and the seconds of each stage."""
     from hybridreg.changes import build
     from hybridreg.cloud import PointCloud
     from hybridreg.io.point_files import holds_several
@@ -134,5 +134,9 @@ def show(result: RegistrationResult, form: str = "matrix") -> None:
         print(f"  - {spoken(reason)}")
     for note in result.notes:
         print(f"note: {spoken(note)}")
+    if result.entries:
+        from hybridreg.output import result_words
+
+        print(f"found by: {result_words.found_by(result)}")
     stages = ", ".join(f"{stage} {seconds:.3f}" for stage, seconds in result.seconds.items())
     print(f"seconds: {stages}; together {sum(result.seconds.values()):.3f}")

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from hybridreg.cli import options
-from hybridreg.cli.error_messages import plainly
+from hybridreg.cli.terminal.error_messages import plainly
 
 if TYPE_CHECKING:
     from hybridreg.eval.score.protocols import Protocol
@@ -22,13 +22,14 @@ if TYPE_CHECKING:
 def command(
     paths: Annotated[list[Path], typer.Argument(help="A table's folder, or files of predictions.")],
     protocols: options.Protocols = None,
-    data: Annotated[str | None, typer.Option(help="Where the data lies now, for the 3D views.")] = None,
+    data: Annotated[str | None, typer.Option(help="Where the data is now, for the 3D views.")] = None,
     out: Annotated[Path | None, typer.Option(help="Folder; the table's own if not given.")] = None,
     pictures: Annotated[
-        int, typer.Option(min=0, help="Run the pipelines again on so many pairs and draw matches and masks.")
+        int,
+        typer.Option(min=0, help="Run the pipelines again on this many pairs and draw matches and masks."),
     ] = 0,
 ) -> None:
-    """Write the reports of a table anew, under any protocol."""
+    """Write the reports of a table again, under any protocol."""
     from hybridreg.cli import table_running
     from hybridreg.eval import table_run
     from hybridreg.eval.score.protocols import protocol
@@ -54,7 +55,7 @@ def _draw(done: Table, chosen: Protocol, pairs: Sequence[LabelledPair] | None, f
 
 
 def _data(done: Table, data: str | None) -> Sequence[LabelledPair] | None:
-    # The views are an extra: data that has gone must not keep anyone from scoring. Named, it must open.
+    # The views are an extra: missing data must not prevent scoring. But data that is named must open.
     from hybridreg.cli.table_running import with_starts
     from hybridreg.data import open_dataset
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""`hybridreg table`: several pipelines side by side, as a TOML file tells."""
+"""`hybridreg table`: several pipelines side by side, listed in a TOML file."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Annotated
 import typer
 
 from hybridreg.cli import options
-from hybridreg.cli.error_messages import plainly
+from hybridreg.cli.terminal.error_messages import plainly
 
 
 @plainly
@@ -21,7 +21,7 @@ def command(
     ] = None,
     protocols: options.Protocols = None,
     starts: Annotated[
-        int | None, typer.Option(min=0, help="Turned copies of each pair; overrides the file.")
+        int | None, typer.Option(min=0, help="Random yaw rotations of each pair; overrides the file.")
     ] = None,
     workers: options.Workers = 1,
     out: Annotated[Path | None, typer.Option(help="Folder; runs/<file's name> if not given.")] = None,

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Running a recipe from the command line: progress, the tables on the screen, the reports in a folder."""
+"""Running a table file from the command line: progress, tables on the screen, reports in a folder."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from hybridreg.cli.console import shown
-from hybridreg.cli.stop_signals import going_on
+from hybridreg.cli.terminal.console import shown
+from hybridreg.cli.terminal.stop_signals import going_on
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 def run(recipe: Recipe, data: str, out: Path, *, workers: int, overwrite: bool) -> None:
-    """Run a recipe with a progress bar on stderr, print its tables and write its reports."""
+    """Run a table file with a progress bar on stderr, print its tables and write its reports."""
     from rich.console import Console
     from rich.progress import Progress
 
@@ -31,7 +31,7 @@ def run(recipe: Recipe, data: str, out: Path, *, workers: int, overwrite: bool) 
     pairs = open_dataset(data)
     n = len(pairs) * (recipe.starts + 1)
     anew = ", without --overwrite," if overwrite else ""
-    kept = f"finished rows are kept in {out}: the same command{anew} goes on from there"
+    kept = f"finished rows are kept in {out}: the same command{anew} continues from there"
     with (
         going_on(lambda: kept),
         Progress(console=Console(stderr=True), disable=not sys.stderr.isatty()) as progress,
@@ -52,7 +52,7 @@ def run(recipe: Recipe, data: str, out: Path, *, workers: int, overwrite: bool) 
 
 
 def with_starts(pairs: Sequence[LabelledPair], starts: int, seed: int) -> Sequence[LabelledPair]:
-    """The pairs under the yaw starts that a table was run with."""
+    """The pairs under the random yaw rotations that a table was run with."""
     from hybridreg.data import YawStarts
 
     return YawStarts(pairs, starts, seed) if starts else pairs
@@ -61,7 +61,7 @@ def with_starts(pairs: Sequence[LabelledPair], starts: int, seed: int) -> Sequen
 def write(
     done: Table, protocols: Sequence[Protocol], out: Path, pairs: Sequence[LabelledPair] | None
 ) -> None:
-    """Write the reports and print the tables; where one cannot be had, the other is."""
+    """Write the reports and print the tables; where one fails, the other is still made."""
     from hybridreg.eval.report import formats, table_report
 
     problem: OSError | None = None
@@ -87,7 +87,7 @@ def print_table(caption: str, lines: Sequence[Cells]) -> None:
     from rich.table import Table as Grid
     from rich.text import Text
 
-    # As text: a name in brackets is no style.
+    # As text: a name in brackets is not a style.
     grid = Grid(title=Text(shown(caption)), title_justify="left")
     for key in lines[0]:
         grid.add_column(Text(shown(key)), justify="left" if key == "method" else "right", no_wrap=True)

@@ -10,8 +10,8 @@ from typing import Annotated
 import typer
 
 from hybridreg.cli import options
-from hybridreg.cli.error_messages import plainly
-from hybridreg.cli.stop_signals import Stopped, going_on
+from hybridreg.cli.terminal.error_messages import plainly
+from hybridreg.cli.terminal.stop_signals import Stopped, going_on
 
 
 @plainly
@@ -25,16 +25,16 @@ def command(
         ),
     ] = None,
     out: Annotated[Path | None, typer.Option(help="Folder; runs/<recipe's name> if not given.")] = None,
-    resume: Annotated[bool, typer.Option("--resume", help="Go on from the folder's checkpoint.")] = False,
+    resume: Annotated[bool, typer.Option("--resume", help="Continue from the folder's checkpoint.")] = False,
     devices: Annotated[int, typer.Option(min=1, help="Processes, one a GPU; torchrun sets its own.")] = 1,
     accelerator: Annotated[str, typer.Option(help="auto, cpu, cuda or mps.")] = "auto",
-    steps_scale: Annotated[float, typer.Option(help="Makes all phases longer or shorter.")] = 1.0,
+    steps_scale: Annotated[float, typer.Option(help="Factor on the length of all phases.")] = 1.0,
     cache: Annotated[Path, typer.Option(help="Folder of prepared pairs, shared by runs.")] = Path(
         "runs/prepared"
     ),
     workers: options.Workers = 1,
 ) -> None:
-    """Train a network; stopped or killed, it goes on with --resume. Ends with weights and their card."""
+    """Train a network; if stopped or killed, continue with --resume. Writes the weights and their model card."""
     from hybridreg.learned.training import recipe_file
     from hybridreg.learned.training.data import data_choice
     from hybridreg.learned.training.loop import CHECKPOINT
@@ -54,8 +54,8 @@ def command(
 
     def how() -> str:
         if (folder / CHECKPOINT).is_file():
-            return f"go on with --resume --out {folder}"
-        return f"prepared pairs are kept in {cache}: the same command goes on from there"
+            return f"continue with --resume --out {folder}"
+        return f"prepared pairs are kept in {cache}: the same command continues from there"
 
     with going_on(how):
         best = train(wanted, run, flag)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Bounds on the fields of a stage, checked when it is made: a wrong number is told where it was written."""
+"""Bounds on the fields of a stage, checked when it is created: an error is reported where the number was written."""
 
 from __future__ import annotations
 

@@ -19,7 +19,7 @@ def build(cls: type[T], values: Mapping[str, Any], where: str) -> T:
     Raises
     ------
     ValueError
-        An unknown key or a value of the wrong kind: it is named, with its place after ``where``.
+        An unknown key or a value of the wrong kind: it is named, with its location after ``where``.
     """
     if not isinstance(values, Mapping):
         raise ValueError(f"{where}: expected a table, got {_shown(values)}")
@@ -36,7 +36,7 @@ def build(cls: type[T], values: Mapping[str, Any], where: str) -> T:
 def value_of(hint: Any, value: Any, where: str) -> Any:
     """A value as an annotation wants it: lists become tuples, whole numbers floats.
 
-    What an annotation does not tell (`Any`, a class of somebody's own) goes through as it is.
+    Values that an annotation does not describe (`Any`, a third-party class) pass unchanged.
 
     Raises
     ------
@@ -61,7 +61,7 @@ def value_of(hint: Any, value: Any, where: str) -> Any:
             for key, item in value.items()
         }
     if origin is Literal:
-        # Not `in` alone: True is 1, and a list has no hash to be looked up by.
+        # Not `in` alone: True equals 1, and a list is not hashable.
         right = any(type(part) is type(value) and part == value for part in parts)
         return _checked(right, value, where, f"one of {', '.join(map(repr, parts))}")
     return _plain(hint, value, where)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Data sets by name, imported when they are asked for."""
+"""Data sets by name, imported on demand."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What lies in files, told without reading them again where they look as they did."""
+"""Hashes of files, without reading them again where they look unchanged."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from pathlib import Path
 
 from hybridreg.io.atomic import write_text
 
-# Size, times of writing and of change (nanoseconds; no tool sets the latter back), number of the file.
+# Size, modification and change times (nanoseconds; no tool resets the latter), inode.
 Looks = tuple[int, int, int, int]
 
-# A file written in the tick in which it was read could be written again without looking different.
+# A file written in the clock tick in which it was read could be written again without looking different.
 _YOUNG_NS = 2_000_000_000
 _BLOCK = 1 << 20
 
@@ -24,9 +24,9 @@ _KNOWN: dict[str, tuple[Looks, str]] = {}
 
 
 def digest(path: str | os.PathLike[str]) -> str:
-    """A hash of a file's content; of a file that looks as it did when it was last hashed, that hash.
+    """A hash of a file's content; the last hash where the file looks unchanged since.
 
-    A file that cannot be read has "unreadable": to tell so is the business of whoever needs its content.
+    A file that cannot be read has the hash "unreadable": whoever needs its content reports that.
     """
     place = os.path.abspath(path)
     try:
@@ -43,13 +43,14 @@ def digest(path: str | os.PathLike[str]) -> str:
 
 
 def looks_of(path: str | os.PathLike[str]) -> Looks:
-    """How a file looks from outside."""
+    """What is known of a file without reading it."""
     stat = os.stat(path)
     return stat.st_size, stat.st_mtime_ns, stat.st_ctime_ns, stat.st_ino
 
 
 def looks_of_all(paths: Iterable[str | os.PathLike[str]]) -> str:
-    """How files look from outside, as one short text; empty where one of them is too young to tell, or gone."""
+    """What is known of files without reading them, as one short text; empty where one is too recent to tell, or
+    gone."""
     total = hashlib.blake2b(digest_size=16)
     try:
         for path in paths:
@@ -64,9 +65,9 @@ def looks_of_all(paths: Iterable[str | os.PathLike[str]]) -> str:
 
 @contextmanager
 def kept_in(file: Path | None) -> Iterator[None]:
-    """Know within the block what an earlier process hashed, and note in `file` what this one does.
+    """Use hashes of an earlier process within the block, and store those of this one in `file`.
 
-    An extra: a note that is damaged or cannot be written only costs the hashing.
+    Optional: a file that is damaged or cannot be written only costs the hashing.
     """
     if file is None:
         yield

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What a data set is: a sequence of labelled pairs whose names are known before any of them is read."""
+"""Data sets: sequences of labelled pairs whose names are known before any of them is read."""
 
 from __future__ import annotations
 
@@ -12,32 +12,32 @@ from hybridreg.pair import LabelledPair
 
 
 class Dataset(Sequence[LabelledPair], ABC):
-    """A sequence of pairs that reads each of them when it is asked for.
+    """A sequence of pairs that are read on access.
 
     Any sequence of `LabelledPair` can be evaluated; this class adds names without reading, which makes
-    resuming quick, and a fingerprint, by which a changed data set is noticed.
+    resuming quick, and a fingerprint, by which a changed data set is detected.
     """
 
     @property
     @abstractmethod
     def ids(self) -> tuple[str, ...]:
-        """Names of the pairs, each once."""
+        """Names of the pairs, all different."""
 
     @abstractmethod
     def load(self, index: int) -> LabelledPair:
         """Read pair number `index`, 0 to len - 1."""
 
     def fingerprint(self) -> str:
-        """Changes when the pairs or their truths do, by the content of their files."""
+        """Changes with the pairs or their true poses, by the content of their files."""
         return f"{zlib.crc32(repr(self.ids).encode()):08x}"
 
     def looks(self) -> str:
-        """Stays as it is only where no file was touched, which is quicker to tell than a fingerprint; empty where
-        that cannot be told."""
+        """Unchanged only where no file was touched, which is quicker to find than a fingerprint; empty where that is
+        unknown."""
         return ""
 
     def pair_fingerprint(self, index: int) -> str:
-        """Changes when pair number `index` does: under it, what was computed of the pair may be kept."""
+        """Changes with pair number `index`: a key under which results computed from the pair can be stored."""
         return f"{self.fingerprint()}-{self.ids[index]}"
 
     def __len__(self) -> int:
@@ -58,12 +58,12 @@ class Dataset(Sequence[LabelledPair], ABC):
 
 
 def ids_of(pairs: Sequence[LabelledPair]) -> tuple[str, ...]:
-    """Names of the pairs of any sequence; one that does not tell them is read through.
+    """Names of the pairs of any sequence; a sequence without `ids` is read through.
 
     Raises
     ------
     ValueError
-        Two pairs of one name, which a resumed run could not tell apart.
+        Two pairs with one name, which a resumed run could not tell apart.
     """
     known = getattr(pairs, "ids", None)
     ids = tuple(known) if known is not None else tuple(labelled.pair.id for labelled in pairs)
@@ -96,20 +96,20 @@ def vouch(pairs: Sequence[LabelledPair]) -> None:
 
 
 def fingerprint_of(pairs: Sequence[LabelledPair]) -> str:
-    """Fingerprint of any sequence: its own where it has one, else that of the names."""
+    """Fingerprint of any sequence: its own where it has one, otherwise that of the names."""
     own = getattr(pairs, "fingerprint", None)
     return str(own()) if callable(own) else f"{zlib.crc32(repr(ids_of(pairs)).encode()):08x}"
 
 
 def looks_of(pairs: Sequence[LabelledPair]) -> str:
-    """How the files of any sequence look from outside: `Dataset.looks`; empty where it does not tell."""
+    """What is known of the files of any sequence without reading them: `Dataset.looks`; empty where it is not known."""
     own = getattr(pairs, "looks", None)
     return str(own()) if callable(own) else ""
 
 
 def pair_fingerprints_of(pairs: Sequence[LabelledPair], n: int | None = None) -> list[str]:
-    """Fingerprint of each pair (the first ``n``) of any sequence: its own where it has one, else the sequence's and
-    its name."""
+    """Fingerprint of each pair (the first ``n``) of any sequence: its own where it has one, otherwise the sequence's
+    and its name."""
     own = getattr(pairs, "pair_fingerprint", None)
     if callable(own):
         return [str(own(index)) for index in range(len(pairs) if n is None else n)]

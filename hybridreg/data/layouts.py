@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: MIT
-"""Which data set a folder is, by what lies in it."""
+"""Which data set a folder is, by its content."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
-# The most telling first: every pattern of a line must be met. Cross3DReg borrows KITTI's folders.
+# The most specific first: every pattern of a line must match. Cross3DReg uses KITTI's folder names.
 _MARKS: tuple[tuple[str, tuple[str, ...]], ...] = (
     ("folder", ("*/meta.json",)),
     ("cross3dreg", ("metadata/*.pkl", "sequences/*/array")),

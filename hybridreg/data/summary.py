@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What a data set holds, measured: motions, overlaps, kinds of sensors, the poses' direction."""
+"""Measured facts of a data set: motions, overlaps, kinds of sensors, the poses' direction."""
 
 from __future__ import annotations
 
@@ -19,18 +19,18 @@ from hybridreg.pair import LabelledPair
 
 Array = NDArray[np.float64]
 
-_CURE = "turn them round: they must map source points to target points"
+_CURE = "invert them: they must map source points to target points"
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Summary:
-    """Facts of a data set: of its clouds, over the pairs that were read; of its poses, over all pairs where
-    they are known without reading.
+    """Facts of a data set: clouds over the pairs that were read, poses over all pairs where they are known without
+    reading.
 
     Attributes
     ----------
     n_pairs, n_read, n_images : int
-        Pairs in the set; read for this; of those, with a photograph.
+        Pairs in the set; read for this; of those, with a camera image.
     fields : tuple of str
         Columns of the data set's own list.
     roles : mapping of "source" and "target" to counts by (sensor's name, kind by `hybridreg.data.lists.azimuth`)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The same pairs from other starts: sensors on one vehicle keep one pose, which a method may have learnt."""
+"""The same pairs under random yaw rotations: sensors on one vehicle keep one pose, which a method may have learnt."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from hybridreg.pair import LabelledPair
 
 
 class YawStarts(Dataset):
-    """Every pair as it is, and `n` times with its source turned about the sensor's z by a random angle.
+    """Every pair as it is, and `n` times with its source rotated about the sensor's z by a random angle.
 
-    Pairs are called `name` and `name@yaw1` to `name@yaw<n>`. The angle hangs on the seed, the name and the
-    number alone, so it is the same whatever other pairs there are.
+    Pairs are called `name` and `name@yaw1` to `name@yaw<n>`. The angle depends on the seed, the name and the number
+    alone, so it is the same whatever other pairs there are.
     """
 
     def __init__(self, pairs: Sequence[LabelledPair], n: int = 3, seed: int = 0) -> None:
@@ -48,12 +48,12 @@ class YawStarts(Dataset):
 
 
 def yaw_starts(pairs: Sequence[LabelledPair], n: int = 3, seed: int = 0) -> YawStarts:
-    """Each pair, and `n` more with the source under a seeded random yaw and the truth turned back by it."""
+    """Each pair, and `n` more with the source under a seeded random yaw rotation and the true pose adapted."""
     return YawStarts(pairs, n, seed)
 
 
 def turned(labelled: LabelledPair, yaw_deg: float, id: str) -> LabelledPair:
-    """The pair with its source turned about the z axis through its sensor, and its truth to match."""
+    """The pair with its source rotated about the z axis through its sensor, and its true pose adapted."""
     pair = labelled.pair
     turn = se3.yaw(yaw_deg)
     points = se3.apply(turn, pair.source.points)

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -109,7 +109,9 @@ def _both(scene: Scene) -> Views:
     # Side by side: most of it is sorting and trees, which each take one thread.
     with ThreadPoolExecutor(min(2, n_threads())) as pool:
         source = pool.submit(_view, scene, "source", spacing, on_grid)
-        target = pool.submit(_view, scene, "target", spacing, on_grid)
+        key = ("view", spacing, scene.target.spacing, on_grid.spacing, scene.pair.gravity)
+        make = partial(_view, scene, "target", spacing, on_grid)
+        target = pool.submit(scene.pair.target.once, key, make)
         return Views(scene=scene, source=source.result(), target=target.result(), spacing=spacing)
 
 

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: MIT
-"""Arrays in, arrays out: nothing here knows a scene or a stage."""
+"""Arrays in, arrays out: nothing here knows about scenes or stages."""

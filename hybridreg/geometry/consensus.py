@@ -14,13 +14,13 @@ from hybridreg.geometry.kabsch import kabsch
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-# Residuals worked on at a time: as float32 they fill half of a 512 kB cache.
+# Residuals computed at a time: as float32 they fill half of a 512 kB cache.
 _CHUNK = 1 << 16
 # The expanded square cancels terms of the size of the extent's square. Where the threshold's square is larger
 # than this share of it, float32 keeps enough digits.
 _COARSE = 50.0 * float(np.finfo(np.float32).eps)
-# A refit that gains less than this share moves the pose by millimetres.
-_MOST_REFITS, _LEAST_GAIN = 10, 1e-3
+_MOST_REFITS = 10  # by hand
+_LEAST_GAIN = 1e-3  # share; a refit that gains less moves the pose by millimetres
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,17 +34,17 @@ class Support:
 
 
 class Consensus:
-    """Matches against which poses are held.
+    """Matches that poses are tested against.
 
-    The square of a residual, `|R p + t - q|^2`, is linear in 17 products of the match's coordinates, with
-    coefficients that only the pose knows. So the residuals of many poses are one matrix product, of which
+    The square of a residual, `|R p + t - q|^2`, is linear in 17 products of the match's coordinates, with coefficients
+    that depend on the pose alone. So the residuals of many poses are one matrix product, of which
     only the sign of (square - threshold) is wanted.
 
     Parameters
     ----------
     source, target : (K, 3)
     weight : (K,)
-        Weighs matches in refits; counts are unweighted.
+        Weights of the matches in refits; counts are unweighted.
     max_distance : float
         Metres; a match agrees when its residual is smaller.
     """
@@ -105,7 +105,8 @@ class Consensus:
 
 
 def distances(poses: Array, T: Array, centre: Array) -> tuple[Array, Array]:
-    """How far poses (B, 4, 4) are from T (4, 4): in degrees, and in metres between where they put `centre`.
+    """Distances of poses (B, 4, 4) from T (4, 4): in degrees, and in metres between the places to which they map
+    `centre`.
 
     The difference of translations would depend on where the frame's origin lies.
     """

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""How far a cloud reaches. Column by column: numpy reduces (N, 3) along its long axis twenty times more slowly."""
+"""The extent of a cloud. Column by column: numpy reduces (N, 3) along its long axis twenty times more slowly."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-# Of the points, whose distance from the cloud's middle is its reach: stray returns lie anywhere.
+# Quantile of the points' distances from the cloud's middle that is its extent: stray returns lie anywhere.
 _MOST = 0.9
-# Points from which quantiles of a cloud are known to a thousandth.
+# Points that give quantiles of a cloud to a thousandth.
 _ENOUGH = 1_000_000
 
 
@@ -23,7 +23,7 @@ def bounds(points: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any]]:
 
 
 def some(points: Array) -> Array:
-    """The points (N, 3) themselves, or of more than a million as many drawn at random, always the same."""
+    """The points (N, 3) themselves, or a million drawn at random where there are more, always the same."""
     if len(points) <= _ENOUGH:
         return points
     return points[np.random.default_rng(0).integers(0, len(points), _ENOUGH)]
@@ -43,5 +43,5 @@ def share_within(radii: Array, share: float) -> float:
 
 
 def reach(radii: Array) -> float:
-    """Reach of a cloud, metres, from its `radii`."""
+    """Extent of a cloud, metres, from its `radii`."""
     return share_within(radii, _MOST)

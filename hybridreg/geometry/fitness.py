@@ -17,10 +17,10 @@ from hybridreg.runtime.cores import n_threads
 
 Array = NDArray[np.float64]
 
-# From so many queries on their order counts: a large tree does not fit the processor's cache, and queries of one place
-# after another ask for the same part of it. Half a million in random order took three times as long.
+# Number of queries from which their order matters: a large tree does not fit the processor's cache, and queries near
+# each other read the same part of it. Half a million in random order took three times as long.
 _MANY = 300_000
-_MOST_CELLS = 2**20  # along an axis, so that three numbers of a cell go into one key
+_MOST_CELLS = 2**20  # cells along an axis, so that a cell's three indices fit into one key
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,10 +41,9 @@ class Fitness:
 
 @dataclass(frozen=True, eq=False)
 class Overlay:
-    """Two whole clouds laid on one another, (N, 3) and (M, 3), with a distance in metres.
+    """Two whole clouds in one frame, (N, 3) and (M, 3), with a distance in metres.
 
-    What is measured on every point takes as long as a quick registration's search, so it is measured when it is first
-    asked for.
+    Measures on every point take as long as the search of a quick registration, so they are computed on first access.
     """
 
     source: Array = field(repr=False)
@@ -54,7 +53,7 @@ class Overlay:
 
     @cached_property
     def _both_ways(self) -> tuple[Fitness, Fitness]:
-        # Side by side, as one thread alone builds a tree.
+        # In parallel, as a tree is built by one thread.
         with ThreadPoolExecutor(min(2, n_threads())) as pool:
             T = self.T_target_source
             forth = pool.submit(measure, self.source, self.target, T, self.max_distance)
@@ -63,12 +62,12 @@ class Overlay:
 
     @property
     def of_source(self) -> Fitness:
-        """The source on the target."""
+        """Fitness of the source on the target."""
         return self._both_ways[0]
 
     @property
     def of_target(self) -> Fitness:
-        """The target on the source."""
+        """Fitness of the target on the source."""
         return self._both_ways[1]
 
 
@@ -104,7 +103,7 @@ def _nearest(tree: cKDTree, points: Array, max_distance: float) -> tuple[Array, 
 
 
 def _by_place(points: Array, cell: float) -> NDArray[np.int64]:
-    """An order of points (n, 3) in which those of one cell of a grid follow each other."""
+    """An order of points (n, 3) that keeps points of one grid cell together."""
     low, high = bounds(points)
     cell = max(cell, float((high - low).max()) / _MOST_CELLS)
     x, y, z = np.minimum((points - low) / cell, _MOST_CELLS - 1).astype(np.int64).T

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The ground of one cloud, in whatever way its sensor hung; of a map too, which no single sensor saw."""
+"""The ground of one cloud, however its sensor was mounted; also of a map, which no single sensor saw."""
 
 from __future__ import annotations
 
@@ -17,20 +17,26 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 Weights = NDArray[np.float64]
 
-# Half the thickness of the ground, as a plane follows uneven ground only so well: metres, yet no more than so much of
-# the cloud's reach (rooms), and no less than so many spacings.
-_THICK, _OF_REACH, _SPACINGS = 0.25, 0.03, 0.6
-# Metres: of points that all lie in one place the above are nought.
+# Half the thickness of the ground, as a plane follows uneven ground only so well; by hand.
+_THICK = 0.25  # metres, at most
+_OF_REACH = 0.03  # of the cloud's extent, at most (rooms)
+_SPACINGS = 0.6  # spacings, at least
+# Metres: where all points lie in one place the above are zero.
 _THIN = 1e-9
-# Triples of points tried; how many look best on few points; how many of these are fitted on all.
-_TRIPLES, _LOOKED_AT, _FITTED = 4000, 120, 6
-_FEW, _MANY = 160, 1500
-# Least share of the cloud on the ground less what lies below it.
+_TRIPLES = 4000  # of points, tried; by hand
+_LOOKED_AT = 120  # of them that are best on `_FEW` points; by hand
+_FITTED = 6  # of these that are best on `_MANY`; by hand
+_FEW = 160  # points, by hand
+_MANY = 1500  # points, by hand
+# Least share of the cloud on the ground, minus the share below it.
 _LEAST = 0.1
-# A steep plane, or one far from the sensor, is a wall more often than a ground (in a lane the walls hold several times
-# the points). A sensor hangs more often upright than on its head.
-_STEEP_DEG, _STEEP = 40.0, 0.15
-_FAR_METRES, _FAR, _UPTURNED = 5.0, 0.5, 0.9
+# A steep plane, or one far from the sensor, is more often a wall than the ground (in a lane the walls have several
+# times as many points). Sensors are more often upright than upside down. All by hand.
+_STEEP_DEG = 40.0  # degrees from level
+_STEEP = 0.15  # factor on the score of a steep plane
+_FAR_METRES = 5.0  # metres below the sensor
+_FAR = 0.5  # factor on the score of a plane farther below
+_UPTURNED = 0.9  # factor on the score of a plane above the sensor's xy-plane
 
 
 class Ground(NamedTuple):
@@ -56,8 +62,8 @@ class Ground(NamedTuple):
 def under(points: Array, viewpoint: Array | None, spacing: float) -> Ground | None:
     """Ground of `points` (n, 3), or None where no plane carries enough of them.
 
-    A search over planes through three points, with a seed of its own: the one that holds most points, with few below
-    it, near points counting more (far ground rises and falls). The sensor may hang in any way; where two planes
+    A search over planes through three points, with a fixed seed: the plane with most points on it and few below, near
+    points counting more (far ground rises and falls). The sensor may be mounted in any orientation; where two planes
     compete, the one under an upright sensor wins.
 
     Parameters
@@ -87,7 +93,7 @@ def under(points: Array, viewpoint: Array | None, spacing: float) -> Ground | No
     scores = _scores(points, weights, ups, heights, thick, seen)
     best_one = int(np.argmax(scores))
     up, height = found[best_one]
-    # Where no plane competes, a steep one needs no more points than another.
+    # Where no plane competes, a steep one needs no more points than any other.
     if scores[best_one] < _LEAST * (_STEEP if _steep(up) else 1.0):
         return None
     return Ground(up, height + float(up @ middle))
@@ -105,7 +111,7 @@ def _nearer_more(points: Array) -> Weights:
 
 
 def _planes(points: Array, rng: np.random.Generator, seen: bool) -> tuple[Array, Array]:
-    # Planes through three points, their normals towards the sensor, which is the origin; both ways where it is not.
+    # Planes through three points, normals towards the sensor, which is at the origin; both signs where it is not known.
     a, b, c = points[rng.integers(0, len(points), (3, _TRIPLES))]
     normals = np.cross(b - a, c - a)
     length = np.linalg.norm(normals, axis=1)
@@ -128,7 +134,7 @@ def _scores(points: Array, weights: Weights, ups: Array, heights: Array, thick: 
 
 
 def _steep(up: Array) -> Any:
-    # Of one plane (3,) or of many (k, 3).
+    # For one plane (3,) or many (k, 3).
     return np.abs(up[..., 2]) < np.cos(np.radians(_STEEP_DEG))
 
 

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Ground that is nowhere quite flat: its small heights and hollows tell one place from another where nothing stands.
+"""Ground relief: small rises and dips of nearly flat ground tell places apart where nothing stands on it.
 
-Ships and aircraft without satellites find their place by the relief under them (terrain contour matching). A field,
-a lawn or a road has hollows of a centimetre or a few, metres wide: less than a surface's tolerance, but the same for
-every sensor.
+Ships and aircraft without satellite navigation locate themselves by the relief under them (terrain contour matching).
+A field, a lawn or a road has relief of a few centimetres, metres wide: less than a surface's tolerance, but the same
+for every sensor.
 """
 
 from __future__ import annotations
@@ -20,25 +20,28 @@ from hybridreg.geometry.ground import Ground
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-# In cells: how far around a place its height is compared; how rough a cell of ground may be; how far it may lie from
-# the heights around (a kerb, the foot of a wall), and from where on it counts no more.
-_AROUND, _ROUGH, _KERB, _MOST = 6, 0.1, 0.3, 0.08
-# Ground lies so near the plane under the sensor: so many cells, and this much more for each metre away from it. What
-# stands on it is looked for so many cells higher.
-_BAND, _SLOPE, _TALL = 1.2, 0.06, 4.0
-# Square cells added to the spread of the cells around, so that a row of cells tells no slope across.
+_AROUND = 6  # cells: radius of the surroundings that a height is compared with; by hand
+_ROUGH = 0.1  # cells: roughness of a cell of ground, at most; by hand
+_KERB = 0.3  # cells: its height over the surroundings, at most (a kerb, the foot of a wall); by hand
+_MOST = 0.08  # cells: heights are clipped at this; by hand
+# Distance of ground from the plane under the sensor, at most; by hand.
+_BAND = 1.2  # cells
+_SLOPE = 0.06  # and this much more for each metre away from the sensor
+_TALL = 4.0  # cells above that in which objects on the ground are looked for; by hand
+# Square cells added to the spread of the cells around, so that a single row of cells gives no slope across it.
 _FIRM = 1.0
-# Points of a cell from which its height is known; cells to each side of the sensor.
-_POINTS, _REACH = 3, 120
-# Grounds that lean more to one another, or lie more cells apart, are not the same.
-_LEAN, _APART = float(np.cos(np.radians(20.0))), 4.0
-# Fewer common cells tell nothing.
+_POINTS = 3  # that a cell needs for a height; by hand
+_REACH = 120  # cells to each side of the sensor; by hand
+# Grounds that are tilted more against each other, or lie farther apart, are not the same; by hand.
+_LEAN = float(np.cos(np.radians(20.0)))  # cosine of the angle
+_APART = 4.0  # cells
+# Fewer common cells say nothing.
 _FEWEST = 20
 _CERTAIN = 0.999
 
 
 class Alike(NamedTuple):
-    """How alike two reliefs are under one pose.
+    """How similar two reliefs are under one pose.
 
     cells : number of cells that both clouds show
     correlation : of their heights, in [-1, 1]; 0 where the cells are few
@@ -49,13 +52,13 @@ class Alike(NamedTuple):
 
     @property
     def information(self) -> float:
-        """What that says for the pose, in nats: the log-likelihood of heights so alike over that of strangers'; below
-        nought where they are opposed."""
+        """Evidence for the pose in nats: the log-likelihood ratio of heights this similar to unrelated ones; negative
+        where they are opposed."""
         return float(nats(self.cells, self.correlation))
 
 
 def nats(cells: Array | float, correlation: Array | float) -> Array:
-    """Mutual information of so many pairs of normal numbers, signed as the correlation is."""
+    """Mutual information of this many pairs of normal numbers with this correlation, with its sign."""
     r = np.clip(correlation, -_CERTAIN, _CERTAIN)
     told: Array = -0.5 * np.sign(r) * cells * np.log1p(-r * r)
     return told
@@ -63,17 +66,17 @@ def nats(cells: Array | float, correlation: Array | float) -> Array:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Relief:
-    """Heights of one cloud's ground, less those around.
+    """Heights of one cloud's ground, minus those around.
 
     Attributes
     ----------
     places : (k, 3) float64
-        Middles of the cells whose ground the cloud shows, in its frame.
+        Centres of the cells whose ground the cloud shows, in its frame.
     heights : (k,) float64, metres
     grid, floor : (n, n) float64
         The same heights, and those over the plane under the sensor, as maps; NaN where the ground is not known.
     T_level_cloud : (4, 4) float64
-        Brings that plane to z = 0 and the sensor over the middle of the maps.
+        Maps that plane to z = 0 and the sensor above the middle of the maps.
     cell : float, metres
     """
 
@@ -86,7 +89,7 @@ class Relief:
 
     @classmethod
     def of(cls, points: Array, viewpoint: Array, ground: Ground, cell: float) -> Relief:
-        """Relief of a cloud (n, 3) that was seen from about `viewpoint` (3,), over `ground`."""
+        """Relief of a cloud (n, 3) seen from around `viewpoint` (3,), over `ground`."""
         centre = ground.levelling @ viewpoint
         T = se3.from_rt(ground.levelling, -np.array([centre[0], centre[1], ground.height]))
         level = se3.apply(T, points)
@@ -108,7 +111,8 @@ class Relief:
         )
 
     def at(self, places: Array) -> Array:
-        """Heights (n,) at places (n, 3) of the cloud's frame; NaN where the ground is not known, or lies elsewhere."""
+        """Heights (n,) at places (n, 3) of the cloud's frame; NaN where the ground is not known, or is somewhere
+        else."""
         level = se3.apply(self.T_level_cloud, places)
         height = looked_up(self.grid, level[:, :2], self.cell)
         far = np.abs(level[:, 2]) > _APART * self.cell + _SLOPE * np.hypot(level[:, 0], level[:, 1])
@@ -124,8 +128,8 @@ def looked_up(grid: Array, xy: Array, cell: float) -> Array:
 
 
 def alike(source: Relief | None, target: Relief | None, T_target_source: Array, every: int = 1) -> Alike:
-    """How alike the ground is under a pose (4, 4), from every so-many-th cell; nothing is known where a cloud shows
-    no ground."""
+    """How similar the ground is under a pose (4, 4), from one cell in `every`; nothing is known where a cloud shows no
+    ground."""
     if source is None or target is None:
         return Alike(0.0, 0.0)
     ups = [r.T_level_cloud[2, :3] for r in (source, target)]
@@ -136,7 +140,7 @@ def alike(source: Relief | None, target: Relief | None, T_target_source: Array, 
     a = np.concatenate([source.heights[::every], back])
     b = np.concatenate([forth, target.heights[::every]])
     both = ~np.isnan(a + b)
-    # Each place was asked for from both sides, so that a pair turned round says the same.
+    # Each place was looked up from both sides, so that the swapped pair gives the same.
     cells = every * np.count_nonzero(both) / 2.0
     if cells < _FEWEST:
         return Alike(cells, 0.0)
@@ -146,8 +150,8 @@ def alike(source: Relief | None, target: Relief | None, T_target_source: Array, 
 
 
 def _columns(level: Array, cell: float) -> tuple[Array, Array, Mask]:
-    # Of each cell (2 * _REACH, 2 * _REACH): mean height of what may be ground, the highest point that stands on it, and
-    # whether it holds even ground.
+    # For each cell (2 * _REACH, 2 * _REACH): mean height of possible ground points, the highest point standing on it,
+    # and whether its ground is even.
     n = 2 * _REACH
     i, j = np.floor(level[:, :2] / cell).astype(np.int64).T + _REACH
     band = _BAND * cell + _SLOPE * np.hypot(level[:, 0], level[:, 1])
@@ -178,7 +182,7 @@ def _around(height: Array, known: Mask) -> Array:
     # slope for a hollow where the known cells lie to one side.
     around = np.zeros_like(height)
     if known.any():
-        # Elsewhere is nothing to compute, and a sensor seldom shows ground all over the map.
+        # Elsewhere there is nothing to compute, and a sensor seldom shows ground all over the map.
         part = tuple(_reached(np.asarray(known.any(axis=1 - axis))) for axis in (0, 1))
         around[part] = _planes_around(height[part], known[part])
     return around

@@ -15,7 +15,7 @@ Status = Literal["ok", "degenerate", "few", "nan"]
 
 STATUSES: tuple[Status, ...] = ("ok", "degenerate", "few", "nan")
 _OK, _DEGENERATE, _FEW, _NAN = range(4)
-# Points on one line leave the turn about it free; their covariance then has one singular value only.
+# Points on one line leave the rotation about it free; their covariance then has only one singular value.
 _COLLINEAR = 1e-6
 # Below this share of its coordinates a cloud's extent is rounding noise: all points are one.
 _NO_EXTENT = 1e-10
@@ -56,7 +56,7 @@ def kabsch_batch(source: Array, target: Array, weight: Array | None = None) -> F
     n_fits, n = source.shape[:2]
     w = np.ones((n_fits, n)) if weight is None else np.asarray(weight, dtype=np.float64)
     total = w.sum(axis=1)
-    # Divided by the exact sum: GeoTransformer's sum + 1e-5 pulls centroids of faint weights to the origin.
+    # Divided by the exact sum: GeoTransformer's sum + 1e-5 pulls centroids towards the origin where weights are small.
     enough = (total >= 1e-8) & (n >= 3)
     w = w / np.where(enough, total, 1.0)[:, None]
     # einsum runs numpy's own loops, so that no BLAS thread count changes the last bit.
@@ -84,6 +84,6 @@ def _rotations(H: Array) -> tuple[Array, Array]:
 
 
 def _rounding(source: Array, target: Array) -> Array:
-    # Size of a covariance that rounding alone can make.
+    # Size of a covariance that rounding alone can produce.
     largest = [np.abs(c).max(axis=(1, 2), initial=0.0) for c in (source, target)]
     return (_NO_EXTENT * largest[0]) * (_NO_EXTENT * largest[1])

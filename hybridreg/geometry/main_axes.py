@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The three directions that the surfaces of a place face."""
+"""The three main directions that the surfaces of a place face."""
 
 from __future__ import annotations
 
@@ -9,19 +9,20 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 Rows = NDArray[np.int64]
 
-# Fixed-point steps to the main axes, at most, and where they rest; each about squares the error.
-_TURNS, _STILL = 12, 1e-6
-# Normals of a cloud from which the axes are found.
+# Fixed-point steps to the main axes; each about squares the error.
+_TURNS = 12  # at most; by hand
+_STILL = 1e-6  # change at which they have converged, no unit; by hand
+# Normals of a cloud that the axes are computed from.
 _SAMPLE = 1_000
 
 
 def main_axes(*facing: Array) -> Array:
-    """Three orthogonal directions (..., 3, 3), rows, along which the normals (..., n, 3) of one or more clouds gather,
-    the commonest first; each cloud has the same say.
+    """Three orthogonal directions (..., 3, 3), rows, around which the normals (..., n, 3) of one or more clouds
+    cluster, the most common first; every cloud has the same weight.
 
-    Eigenvectors of the normals' scatter alone lie askew where two directions are equally common (the floor and the
-    walls of a room). From there the sum of fourth powers of the normals' components is made as large as a rotation
-    can, the fixed point that independent component analysis uses for kurtosis.
+    Eigenvectors of the normals' scatter alone are ambiguous where two directions are equally common (the floor and the
+    walls of a room). From there the sum of fourth powers of the normals' components is maximised over rotations, by
+    the fixed-point iteration that independent component analysis uses for kurtosis.
     """
     some = [n[..., :: max(1, n.shape[-2] // _SAMPLE), :] for n in facing]
     normals = np.concatenate(some, axis=-2)
@@ -42,7 +43,7 @@ def main_axes(*facing: Array) -> Array:
 
 
 def faced(normals: Array, axes: Array) -> Rows:
-    """Which of the axes (..., 3, 3) each normal (..., n, 3) lies nearest to, (..., n)."""
+    """The axis (..., 3, 3) that each normal (..., n, 3) is nearest to, (..., n)."""
     axis: Rows = np.argmax(np.abs(normals @ np.swapaxes(axes, -1, -2)), axis=-1)
     return axis
 
@@ -50,8 +51,8 @@ def faced(normals: Array, axes: Array) -> Rows:
 def balanced(normals: Array, n: int) -> Rows:
     """At most n rows, in random order, that face each main axis equally often, as far as there are such rows.
 
-    On a field nine points in ten lie on the ground, which says nothing of where along it two clouds meet; normal-space
-    sampling (Rusinkiewicz and Levoy 2001) lets the few others speak.
+    On a field nine points in ten lie on the ground, which does not constrain a shift along it; normal-space sampling
+    (Rusinkiewicz and Levoy 2001) gives the few other points their weight.
     """
     axis = faced(normals, main_axes(normals))
     rng = np.random.default_rng(0)

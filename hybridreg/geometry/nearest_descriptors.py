@@ -37,7 +37,7 @@ def nearest(source: Array, target: Array) -> Nearest:
 
     In 33 dimensions a tree visits most of its leaves, so this is brute force: the squared distances are one
     float32 matrix product, made in blocks of rows that stay in the cache. One BLAS thread, so that the number
-    of threads cannot decide a tie. `benchmarks/nearest_speed.py` holds it against four other libraries.
+    of threads cannot decide a tie. `benchmarks/nearest_speed.py` compares it with four other libraries.
 
     Parameters
     ----------

@@ -18,12 +18,12 @@ _FEWEST = 5
 def estimate(points: Array, viewpoint: Array | None, k: int = 20) -> Array:
     """Normals (n, 3) of `points` (n, 3): the direction of least spread among the k nearest neighbours.
 
-    Of unit length, towards the sensor at `viewpoint` (3,), the nearest of several (k, 3), or upwards where its place is
-    not known. By small_gicp, which takes a quarter of numpy's time.
+    Of unit length, oriented towards the sensor at `viewpoint` (3,), the nearest of several (k, 3), or upwards where
+    its position is not known. Computed by small_gicp, in a quarter of numpy's time.
     """
     small_gicp = load("small_gicp", "every estimate of normals")
     k = min(k, len(points))
-    # All neighbours several times over tell the same.
+    # Repeating all neighbours gives the same normal.
     times = -(-_FEWEST // k)
     cloud = small_gicp.PointCloud(np.tile(points, (times, 1)))
     # One thread (`hybridreg.runtime.threads`): with two, a level of 5,000 points took as long on idle cores, and

@@ -16,12 +16,12 @@ from hybridreg.runtime.cores import query_threads
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-# Partners that a step takes, at least.
+# Correspondences that a step needs, at least.
 _FEWEST = 30
 
 
 class Planes(Protocol):
-    """What points are laid on: points (n, 3), their KD-tree, and the normals (..., 3) of rows (...)."""
+    """The planes that points are fitted to: points (n, 3), their KD-tree, and the normals (..., 3) of rows (...)."""
 
     @property
     def points(self) -> Array: ...
@@ -33,14 +33,15 @@ class Planes(Protocol):
 def descend(
     T: Array, points: Array, surfaces: Planes, steps: Iterable[tuple[float, float]], *, sized: bool = False
 ) -> Array:
-    """Poses (..., 4, 4) that steps of point-to-plane ICP reach from T, until too few `points` (n, 3) have a partner.
+    """Poses (..., 4, 4) that steps of point-to-plane ICP reach from T, until too few `points` (n, 3) have a
+    correspondence.
 
     Parameters
     ----------
     steps : pairs of float
-        Farthest partner and width of the weights, metres, of each.
+        Maximum correspondence distance and width of the weights, metres, of each step.
     sized : bool
-        Fit the size too: the poses are similarities then.
+        Fit the scale too: the poses are then similarities.
     """
     poses = np.array(T, dtype=np.float64).reshape(-1, 4, 4)
     moving = np.arange(len(poses))
@@ -60,10 +61,10 @@ def descend(
 
 
 def _step_onto(planes: Array, normals: Array, points: Array, hit: Mask, width: float, sized: bool) -> Array:
-    """Motions (b, 4, 4) of one step of point-to-plane ICP that bring those `points` (b, n, 3) that `hit` (b, n) marks
-    nearer to `planes` through points (b, n, 3) with `normals` (b, n, 3); `sized`, they make them larger or smaller too.
+    """Motions (b, 4, 4) of one step of point-to-plane ICP that move those `points` (b, n, 3) that `hit` (b, n) marks
+    towards the `planes` through points (b, n, 3) with `normals` (b, n, 3); with `sized`, they scale them too.
 
-    Cauchy weights of `width` metres: half of the neighbours of a wrong guess are no neighbours.
+    Cauchy weights of `width` metres: at a wrong guess half of the nearest neighbours are not true correspondences.
     """
     gap = np.einsum("bni,bni->bn", points - planes, normals)
     weight = hit / (1.0 + (gap / width) ** 2)

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""What a sensor saw from where it stood: in each direction, how far it looked.
+"""Range image of a cloud: how far its sensor saw in each direction, and which places it saw as free.
 
 A grid of rows and columns suits one kind of sensor in one orientation. Here the directions themselves are the
-image: returns thinned to cells of equal angle on the sphere, and a KD-tree over them. Rings, fans, rosettes and
-hemispheres, upright or not, are all the same to it, and a turned cloud gives the same answers.
+image: returns thinned to cells of equal angle on the sphere, and a KD-tree over them. It works alike for rings, fans,
+rosettes and hemispheres, upright or not, and a rotated cloud gives the same results. Free space, the test that a pose
+must pass, is `RangeImage.look` (docs/methods.md 12.1).
 """
 
 from __future__ import annotations
@@ -22,31 +23,30 @@ from hybridreg.runtime.cores import query_threads
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
-# The finest and coarsest cell, radians: below half a degree two clouds cannot be compared anyway, and beyond
-# four degrees a few stray returns would pass for a field of view.
-_FINEST, _COARSEST = np.radians(0.5), np.radians(4.0)
+_FINEST = np.radians(0.5)  # cell: below half a degree two clouds cannot be compared anyway
+_COARSEST = np.radians(4.0)  # cell: above four degrees a few stray returns would count as a field of view
 # Cells are as wide as the gaps between returns when doubling them covers less than this much more of the sky. It
 # would be 1 for a sharp-edged field of view with even rings; uneven rings and ragged edges add to it.
 _FILLED = 1.5
 _BITS = 12  # of a cell's index along one axis
-# Steeper than this a surface is seen edge-on, degrees: a ray beside the point that goes on may graze the same surface
-# far behind it. Most ground is seen so.
+# Beyond this angle of incidence a surface is seen edge-on, degrees: a ray beside the point that continues may graze
+# the same surface far behind it. Most ground is seen like this.
 _EDGE_ON_DEG = 75.0
-# Of a cloud's reach, as in `hybridreg.resolution`.
+# Cells along a cloud's extent, as in `hybridreg.resolution`.
 _CELLS_ALONG_REACH = 60.0
-# Places from which a cloud was seen, at most: each has an image of its own.
+# Viewpoints of a cloud, at most: each has its own image.
 _MOST_PLACES = 8
 # Two returns of one cell whose ranges differ by less than this share lie on one surface.
 _ONE_SURFACE = 0.1
 
 
 class Seen(IntEnum):
-    """What a sensor tells about a place."""
+    """What a sensor says about a place."""
 
-    UNSEEN = 0  # it did not look there, or nothing came back
+    UNSEEN = 0  # it did not look there, or got no return
     SEEN = 1  # it got a return from there
-    FREE = 2  # it looked through, and hit something behind
-    HIDDEN = 3  # something before it stood in the way
+    FREE = 2  # a free-space violation for a point here: the ray continued and hit something behind
+    HIDDEN = 3  # something in front of it was hit
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,7 +75,7 @@ class RangeImage:
         Raises
         ------
         ValueError
-            If no point lies apart from the viewpoint.
+            If all points lie at the viewpoint.
         """
         ray = points - viewpoint
         reach = np.sqrt(np.einsum("ni,ni->n", ray, ray))
@@ -95,21 +95,21 @@ class RangeImage:
     def look(
         self, points: Array, normals: Array | None = None, *, margin: float, reach: float = np.inf, k: int = 4
     ) -> NDArray[np.int8]:
-        """Tell of each point (m, 3) whether this sensor saw it.
+        """Whether this sensor saw each point (m, 3), saw free space there, or could not tell.
 
         Parameters
         ----------
         normals : (m, 3) or None
-            Of the surfaces that the points lie on; without them a surface is taken to face the sensor at 45 degrees.
+            Of the surfaces that the points lie on; without them an angle of incidence of 45 degrees is assumed.
         margin : float
             Metres by which two ranges of one surface may differ.
         reach : float
-            Metres that the surface extends sideways from a point. A ray that passes the point further away might
-            miss the surface, and tells nothing.
+            Metres that the surface extends sideways from a point. A ray that passes the point at a larger distance
+            might miss the surface, and says nothing.
         k : int
-            Nearest rays that are asked. One that stops at the point is enough for SEEN; all must go on behind it
-            for FREE, so that a ray beside a narrow thing does not deny it. Of a surface that is seen edge-on none
-            tells FREE.
+            Nearest rays that are compared. One that ends at the point is enough for SEEN; all must continue behind it
+            for FREE, so that a ray beside a narrow object is no violation. For a surface seen edge-on no ray gives
+            FREE.
 
         Returns
         -------
@@ -138,15 +138,15 @@ class RangeImage:
 
 @dataclass(frozen=True, eq=False)
 class RangeImages:
-    """Range images of a cloud that was seen from several places, each of the points seen from there."""
+    """Range images of a cloud with several viewpoints, each of the points seen from there."""
 
     images: tuple[RangeImage, ...]
 
     @classmethod
     def of(cls, points: Array, places: Array, of_point: Integers) -> RangeImages:
-        """Images of `points` (N, 3) about those `places` (k, 3) from which most were seen.
+        """Images of `points` (N, 3) from those viewpoints `places` (k, 3) that saw most points.
 
-        `of_point` (N,) is the row of each point's place.
+        `of_point` (N,) is the row of each point's viewpoint.
         """
         counts = np.bincount(of_point, minlength=len(places))
         most = [int(k) for k in np.argsort(-counts, kind="stable")[:_MOST_PLACES] if counts[k] > 0]
@@ -155,7 +155,7 @@ class RangeImages:
     def look(
         self, points: Array, normals: Array | None = None, *, margin: float, reach: float = np.inf, k: int = 4
     ) -> NDArray[np.int8]:
-        """As of one image: seen or looked through where any sensor did, hidden only where none did."""
+        """As for one image: seen or free where any sensor says so, hidden only where none does."""
         states = np.stack(
             [image.look(points, normals, margin=margin, reach=reach, k=k) for image in self.images]
         )
@@ -164,8 +164,8 @@ class RangeImages:
 
 
 def _finest(points: Array, ranges: Array) -> float:
-    # Half of the cells into which the cloud is cut to be compared, as they are seen: of a small thing seen from near by
-    # far finer than of a street.
+    # Half the angle of the cells in which clouds are compared: far finer for a small object seen from near than for a
+    # street.
     some = points[:: max(1, len(points) // 5_000)]
     cell = reach_of(radii(some)) / _CELLS_ALONG_REACH
     return float(np.clip(0.5 * cell / float(np.median(ranges)), 2.0 / (1 << _BITS) * 1.01, _FINEST))
@@ -188,7 +188,7 @@ def angular_resolution(directions: Array, finest: float = _FINEST) -> float:
 
 
 def _cells(directions: Array, angle: float) -> Integers:
-    # A cube grid cut by the sphere: the same in every orientation but for a factor, no poles, no seam.
+    # A cube grid intersected with the sphere: the same in every orientation up to a factor, no poles, no seam.
     x, y, z = ((np.ascontiguousarray(directions.T) + 1.0) / angle).astype(np.int64)
     return (x << 2 * _BITS) | (y << _BITS) | z
 
@@ -207,7 +207,7 @@ def _thin(directions: Array, ranges: Array, angle: float) -> tuple[Array, Array]
     change = np.flatnonzero(np.diff(cell[order]))
     near = order[np.concatenate([[0], change + 1])]
     far = order[np.concatenate([change, [len(order) - 1]])]
-    # The farthest return too where it lies on another surface: a cell on an edge must tell of both.
+    # The farthest return too where it lies on another surface: a cell on an edge must represent both.
     kept = np.concatenate([near, far[ranges[far] > (1.0 + _ONE_SURFACE) * ranges[near]]])
     return directions[kept], ranges[kept]
 

@@ -32,7 +32,7 @@ def inverse(T: Array) -> Array:
 
 
 def about(centre: Array, R: Array, shift: Array | float = 0.0) -> Array:
-    """Rigid motion (..., 4, 4) that turns by R (..., 3, 3) about a place (..., 3), and then moves it by `shift`
+    """Rigid motion (..., 4, 4) that rotates by R (..., 3, 3) about a point (..., 3), and then translates it by `shift`
     (..., 3)."""
     return from_rt(R, centre - (R @ centre[..., None])[..., 0] + shift)
 
@@ -68,12 +68,12 @@ def skew(v: Array) -> Array:
 
 
 def yaw(angle_deg: float) -> Array:
-    """Rigid motion (4, 4) that turns about z."""
+    """Rigid motion (4, 4) that rotates about z."""
     return from_rt(rotation_about(np.array([0.0, 0.0, np.deg2rad(angle_deg)])), np.zeros(3))
 
 
 def project(M: Array) -> Array:
-    """Rotation nearest to a 3x3 matrix: orthogonal, determinant +1."""
+    """Nearest rotation to a 3x3 matrix: orthogonal, determinant +1."""
     U, _, Vt = np.linalg.svd(M)
     flip = np.sign(np.linalg.det(U @ Vt)) or 1.0
     return U @ np.diag([1.0, 1.0, flip]) @ Vt
@@ -107,7 +107,7 @@ def check(T: Any, name: str = "T", tolerance: float = 1e-4) -> Array:
     Raises
     ------
     ValueError
-        No numbers, wrong shape, not finite, last row not (0, 0, 0, 1), or a rotation off by more than `tolerance`.
+        Not numbers, wrong shape, not finite, last row not (0, 0, 0, 1), or a rotation off by more than `tolerance`.
     """
     try:
         matrix = np.asarray(T, dtype=np.float64)
@@ -126,7 +126,7 @@ def check(T: Any, name: str = "T", tolerance: float = 1e-4) -> Array:
         determinant = float(np.linalg.det(matrix[:3, :3]))
     if not off <= tolerance or determinant < 0:
         raise ValueError(
-            f"{name}: the upper left 3x3 block is no rotation (R R^T is off by {off:.2g}, "
+            f"{name}: the upper left 3x3 block is not a rotation (R R^T is off by {off:.2g}, "
             f"determinant {determinant:.3g}); remove scale or reflection"
         )
     return matrix

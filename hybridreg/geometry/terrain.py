@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Ground that is not flat: its height over the plane under the sensor, as a coarse map."""
+"""Terrain: the height of uneven ground over the plane under the sensor, as a coarse map."""
 
 from __future__ import annotations
 
@@ -12,9 +12,10 @@ from hybridreg.geometry.extent import bounds
 
 Array = NDArray[np.float64]
 
-# Points within this of the plane, and this more for each metre of distance, may be ground: a slope of a few degrees.
-_NEAR, _SLOPE = 0.4, 0.08
-# Weight of the plane where cells without ground lie about.
+# Points this close to the plane may be ground; by hand.
+_NEAR = 0.4  # metres
+_SLOPE = 0.08  # and this much more for each metre of distance: a slope of a few degrees
+# Weight of the plane where cells around have no ground.
 _PLANE = 0.02
 # The lowest point of a cell lies below its ground by about the noise.
 _LIFT = 0.05
@@ -54,7 +55,7 @@ class Terrain:
         return cls(total / (weight + _PLANE) + _LIFT, corner, cell)
 
     def at(self, xy: Array) -> Array:
-        """Height (n,) of the ground at places (n, 2), metres; beyond the map that of its border."""
+        """Height (n,) of the ground at places (n, 2), metres; beyond the map the height at its border."""
         i, j = np.clip(
             ((xy - self.corner) / self.cell).astype(np.int64), 0, np.array(self.heights.shape) - 1
         ).T

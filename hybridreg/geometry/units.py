@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Coordinates that are probably no metres: which cloud's, and which unit is likely."""
+"""Coordinates that are probably not in metres: of which cloud, and in which unit."""
 
 from __future__ import annotations
 
@@ -17,12 +17,14 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 _UNITS = ((1e-3, "millimetres"), (1e-2, "centimetres"), (1e3, "kilometres"))
-# Metres that most scans reach, from an object on a table to a street; and the middle of them.
-_SHORTEST, _LONGEST, _USUAL = 0.3, 300.0, 15.0
-# Reaches of two clouds of one place differ by less; and how far the quotient may lie from a unit's.
-_UNLIKE, _NEAR = 25.0, 5.0
-# Degrees of a scan's extent, at most; and how many times as far it then spreads along z, which is in metres.
-_DEGREES, _UPRIGHT = 0.2, 100.0
+# Extents of most scans, from an object on a table to a street; by hand.
+_SHORTEST = 0.3  # metres
+_LONGEST = 300.0  # metres
+_USUAL = 15.0  # metres, about the geometric middle
+_UNLIKE = 25.0  # factor: extents of two clouds of one place differ by less; by hand
+_NEAR = 5.0  # factor by which their ratio may differ from that of two units; by hand
+_DEGREES = 0.2  # degrees: extent of a scan in longitude and latitude, at most; by hand
+_UPRIGHT = 100.0  # least ratio to that of its spread along z, which is in metres; by hand
 _LOOKED_AT = 2_000
 
 
@@ -65,7 +67,7 @@ def _whole_numbers(cloud: PointCloud, other: PointCloud) -> str:
     if not _is_whole(cloud):
         return ""
     own = reach(cloud.radii)
-    # What the other cloud reaches, in metres, is the best guess of what this one does.
+    # The other cloud's extent, in metres, is the best guess of this one's.
     aim = reach(other.radii) if not _is_whole(other) and _plausible(other) else _USUAL
     if own <= 0.0:
         return ""
@@ -81,7 +83,7 @@ def _plausible(cloud: PointCloud) -> bool:
 
 
 def _unlike(pair: Pair) -> dict[str, str]:
-    # One cloud in another unit than the other: the one whose reach no sensor has is to blame.
+    # The clouds are in different units: the one with an extent that no sensor has is at fault.
     reaches = {"source": reach(pair.source.radii), "target": reach(pair.target.radii)}
     small, large = sorted(reaches, key=lambda name: reaches[name])
     if reaches[small] <= 0.0 or reaches[large] < _UNLIKE * reaches[small]:

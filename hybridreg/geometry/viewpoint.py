@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""Where a cloud was seen from: one place, several, or honestly none.
+"""Where a cloud was seen from: one viewpoint, several, or none that is known.
 
 Free space, the side of a surface and "up" follow from it, so it is never assumed. What the user or a data set says is
-taken. Otherwise the place that a file names, or the origin of its frame, is put to the test: from where a sensor
-stood, neighbouring rays end on one surface; from anywhere else (a map's origin, a vehicle's axle) surfaces that lie
-behind one another mix.
+taken. Otherwise the viewpoint in the file, or the origin of its frame, is tested: from where a sensor stood,
+neighbouring rays end on one surface; from anywhere else (a map's origin, a vehicle's axle) they mix surfaces that lie
+behind one another.
 """
 
 from __future__ import annotations
@@ -20,24 +20,27 @@ from hybridreg.geometry.extent import radii, reach
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
-# What a caller may say: "auto" puts the origin to the test, "none" (or None) is no place at all, one place, or places
-# with the row of each point's.
+# What a caller may give: "auto" tests the origin, "none" (or None) is no viewpoint at all, one viewpoint, or several
+# with each point's row among them.
 Given = Any
 
-# Share of neighbouring rays whose ranges differ by more than a fifth: at most 0.17 from the places of 52 sensors, real
-# and simulated, raw and thinned to 0.25 m; 0.2 to 0.6 from the ground under 45 of them.
-_DIFFER, _MOST_JUMPS = 1.2, 0.18
-# Rays that are compared; rays looked at for that, and the cells (radians) of which they fill some whole ones.
-_ASKED, _RAYS, _CELL = 2_000, 30_000, 0.1
-# A cloud that fills a narrower cone (radians) shows nothing of where it was seen from.
+_DIFFER = 1.2  # ratio of neighbouring ranges from which they differ; by hand
+# Share of neighbouring rays that differ, at most: up to 0.17 from the viewpoints of 52 sensors, real and simulated,
+# raw and thinned to 0.25 m; 0.2 to 0.6 from the ground under 45 of them.
+_MOST_JUMPS = 0.18
+_ASKED = 2_000  # rays that are compared; by hand
+_RAYS = 30_000  # rays sampled for that; by hand
+_CELL = 0.1  # radians: cells of which the sampled rays fill some completely; by hand
+# A cloud that fills a narrower cone (radians) does not show where it was seen from.
 _NARROWEST = np.radians(4.0)
-# Nothing looks at a ground from lower than this: metres, yet no more than so much of the cloud's reach.
-_LOWEST, _OF_REACH = 0.15, 0.05
-# From so many times as high, less than this share of the neighbouring rays differ if the origin lies in the ground.
-_LIFT, _FEWER = 10.0, 0.6
-# Share of the points on one plane from which a cloud is flat: the scan of a single beam, not a ground. Fewest points on
-# it that tell its height.
-_FLAT, _FEWEST = 0.95, 20
+# Least height of a sensor over the ground; by hand.
+_LOWEST = 0.15  # metres
+_OF_REACH = 0.05  # of the cloud's extent, at most
+# Seen from this many least heights up, less than this share of the jumps remain if the origin lies in the ground.
+_LIFT = 10.0  # by hand
+_FEWER = 0.6  # by hand
+_FLAT = 0.95  # share of points on one plane above which it is a single beam's scan, not ground; by hand
+_FEWEST = 20  # points of a ground that give its height; by hand
 
 
 _ORIGIN = "the origin of its frame"
@@ -46,8 +49,8 @@ _ORIGIN = "the origin of its frame"
 class Seen(NamedTuple):
     """Where a cloud was seen from, in its own frame.
 
-    places : (k, 3) float64; none where it is not known, or there is no such place
-    of_point : (N,) int64 or None, row of each point's place where there are several
+    places : (k, 3) float64; empty where it is not known, or there is no single viewpoint
+    of_point : (N,) int64 or None, row of each point's viewpoint where there are several
     words : how that is known
     """
 
@@ -56,17 +59,17 @@ class Seen(NamedTuple):
     words: str
 
     def of(self, rows: NDArray[np.bool_] | None) -> Seen:
-        """What remains where only some rows (N,) of the points do."""
+        """The viewpoints of a subset of the points, rows (N,)."""
         kept = self.of_point if self.of_point is None or rows is None else self.of_point[rows]
         return self._replace(of_point=kept)
 
     def less(self, offset: Array) -> Seen:
-        """The same places with the cloud's offset (3,) taken off."""
+        """The same viewpoints minus the cloud's offset (3,)."""
         return self._replace(places=self.places - offset)
 
 
 def given(value: Given, n_points: int, name: str) -> Seen | None:
-    """What a caller said of `n_points` points; None where the origin is to be tested.
+    """What a caller gave for `n_points` points; None where the origin is to be tested.
 
     Parameters
     ----------
@@ -118,8 +121,8 @@ def _short(value: Given) -> str:
 
 
 def found(points: Array, place: Array | None = None) -> Seen:
-    """The origin of the frame of `points` (N, 3), or the `place` (3,) that their file names, if a sensor may have stood
-    there; else no place, and why."""
+    """The origin of the frame of `points` (N, 3), or the viewpoint `place` (3,) in their file, if a sensor may have
+    stood there; otherwise none, and why."""
     if place is None:
         against = _against_origin(points)
         return Seen(np.zeros((0, 3)), None, against) if against else Seen(np.zeros((1, 3)), None, _ORIGIN)
@@ -148,10 +151,10 @@ def _rays(points: Array) -> tuple[Array, Array]:
 
 
 def differing(directions: Array, distances: Array) -> float:
-    """Share of the rays (n, 3) that end on another surface than the ray beside them, by their `distances` (n,)."""
+    """Share of the rays (n, 3) that end on a different surface than the neighbouring ray, by their `distances` (n,)."""
     rng = np.random.default_rng(0)
     if len(directions) > _RAYS:
-        # Whole patches of the sky, as thinned rays would lie farther apart.
+        # Whole patches of the sphere, as thinned rays would be farther apart.
         cells = ((directions + 1.0) / _CELL).astype(np.int64) @ np.array([1, 1_000, 1_000_000])
         order = rng.permutation(np.unique(cells))
         kept = np.isin(cells, order[: max(1, len(order) * _RAYS // len(cells))])
@@ -175,11 +178,11 @@ def _against_height(points: Array, jumps: float) -> str:
     on_it = some[np.abs(plane.above(some)) < 2.0 * lowest]
     if len(on_it) < _FEWEST or len(on_it) > _FLAT * len(some):
         return ""
-    # The ground near by, as it rises and falls further on.
+    # The ground nearby, as it rises and falls farther away.
     distance = np.einsum("ni,ni->n", on_it, on_it)
     near = on_it[np.argsort(distance)[: max(_FEWEST, len(on_it) // 20)]]
     height = -float(np.median(near @ plane.up))
-    # A hedge's top may pass for a ground; but a sensor sees no more of it from higher up.
+    # The top of a hedge may look like ground; but it does not look smoother from higher up.
     if abs(height) >= lowest or differing(*_rays(points - _LIFT * lowest * plane.up)) > _FEWER * jumps:
         return ""
     return f"its origin lies in the ground ({height:+.2f} m over it)"

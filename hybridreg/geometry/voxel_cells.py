@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Cells of a voxel grid and the centroids of the points in them, of any number of points in little memory."""
+"""Cells of a voxel grid and the centroids of the points in them, for any number of points in little memory."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 _MOST_CELLS = 2**62
-# Points that are sorted at once: more would not be faster, and take seven times their own memory.
+# Points sorted at once: more would not be faster, and sorting takes seven times their memory.
 _LOT = 2**20
-# Cells of several lots from which they are put together before more are made.
+# Cells of several batches from which these are merged before the next batch.
 _KEPT = 4 * _LOT
 
 
@@ -23,7 +23,7 @@ class Cells(NamedTuple):
     """Occupied cells, ordered: x first, then y, then z.
 
     centroids : (n, 3) float64
-    first : (n,) int64, row of a point in each
+    first : (n,) int64, row of one point in each
     """
 
     centroids: Array
@@ -49,15 +49,15 @@ def voxel_centroids(points: Array, voxel: float) -> Array:
     Raises
     ------
     ValueError
-        If the grid has more cells than an index can tell apart.
+        If the grid has more cells than an index can represent.
     """
     return voxel_cells(points, voxel).centroids
 
 
 def voxel_cells(points: Array, voxel: float) -> Cells:
     """The occupied cells of a grid with edges of `voxel` metres; as `voxel_centroids`."""
-    # The origin lies a hair below the smallest coordinate: data rounded to millimetres would otherwise sit on
-    # cell borders, where the last digit of a float decides.
+    # The origin lies slightly below the smallest coordinate: data rounded to millimetres would otherwise lie on cell
+    # borders, where the last digit of a float decides.
     low, high = _corners(points)
     origin = low - 1e-5 * voxel
     shape = np.floor((high - origin) / voxel) + 1.0
@@ -110,7 +110,7 @@ def _members(key: Integers, n_cells: int) -> tuple[Integers, Integers, Integers]
 
 
 def _merged(lots: list[_Lot]) -> _Lot:
-    # The same cells of several lots, one after another: a stable order keeps the first row first.
+    # The same cells of several batches, one after another: a stable order keeps the first row first.
     key = np.concatenate([lot.key for lot in lots])
     order = np.argsort(key, kind="stable")
     key = key[order]

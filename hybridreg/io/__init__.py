@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Reading clouds and photographs; writing clouds, transforms and records."""
+"""Reading clouds and camera images; writing clouds, transforms and records."""
 
 from hybridreg.io.atomic import atomic_path, write_bytes, write_text
 from hybridreg.io.formats.image import as_image, check_image, read_image

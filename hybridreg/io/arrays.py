@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The points in a NumPy array of any layout that drivers and kits give it."""
+"""The points in a NumPy array, in any of the layouts that drivers and development kits use."""
 
 from __future__ import annotations
 
@@ -16,16 +16,17 @@ Array = NDArray[np.float64]
 
 # Fields of one array that hold all three coordinates.
 TOGETHER = ("xyz", "points", "point", "positions", "position", "pos", "coords", "coord", "coordinates")
-# A cloud has at least 20 points, so that 3 to 6 rows of as many are channels: x, y, z, w (or intensity), ring, time.
-FEWEST, _MOST_CHANNELS = 20, 6
-# Sensors have eight rows and more; a stack of fewer images is more likely several clouds.
+FEWEST = 20  # points of a cloud, at least
+# So 3 to 6 rows of at least that length are channels: x, y, z, w (or intensity), ring, time.
+_MOST_CHANNELS = 6
+# Sensors have eight rows or more; a stack with fewer is more likely several clouds.
 _FEWEST_ROWS = 8
 # Of a raw LAS record: its X, Y and Z are whole numbers still to be scaled.
 _LAS_ONLY = ("bit_fields", "raw_classification", "point_source_id")
 
 
 def array_points(array: NDArray[Any], name: str, *, batched: bool = False) -> Array:
-    """x, y and z, shape (N, 3), a copy; what is masked becomes NaN.
+    """x, y and z, shape (N, 3), a copy; masked values become NaN.
 
     Parameters
     ----------
@@ -48,13 +49,13 @@ def array_points(array: NDArray[Any], name: str, *, batched: bool = False) -> Ar
     rows = _rows(array, name, batched)
     if rows.shape[1] > 3 and counts_up(rows[:, 0]):
         raise fault(
-            name, "its first column counts the rows, it is no coordinate", "leave it out: give columns 2 to 4"
+            name, "its first column is a row number, not a coordinate", "leave it out: give columns 2 to 4"
         )
     return _numbers(rows[:, :3])
 
 
 def counts_up(column: NDArray[Any]) -> bool:
-    """Whether a column counts its rows: 20 of them or more, each one more than the last."""
+    """Whether a column holds row numbers: at least 20 values, each one more than the last."""
     return bool(len(column) >= FEWEST and column[1] - column[0] == 1 and np.all(np.diff(column) == 1))
 
 
@@ -112,7 +113,7 @@ def _numbers(values: NDArray[Any]) -> Array:
     with np.errstate(over="ignore", invalid="ignore"):  # beyond float64 is infinite, and refused as such
         numbers = np.array(np.ma.getdata(values), dtype=np.float64, order="C")
     if np.ma.isMaskedArray(values):
-        numbers[np.ma.getmaskarray(values)] = np.nan  # a fill value is no coordinate
+        numbers[np.ma.getmaskarray(values)] = np.nan  # a fill value is not a coordinate
     return numbers
 
 

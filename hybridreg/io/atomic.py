@@ -75,7 +75,7 @@ def write_bytes(path: str | os.PathLike[str], data: bytes) -> None:
 def write_text(path: str | os.PathLike[str], text: str) -> None:
     """Write `text` to `path` as UTF-8 with newlines as given, whole or not at all (see `atomic_path`).
 
-    Bytes of a file's name that are no UTF-8 come as lone surrogates, and are written as ``\\udcff``.
+    Bytes of a file's name that are not UTF-8 arrive as lone surrogates, and are written as ``\\udcff``.
     """
     write_bytes(path, text.encode("utf-8", "backslashreplace"))
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A pair's photograph: pixels, or the path of a file that is decoded when it is first looked at."""
+"""A pair's camera image: pixels, or the path of a file that is decoded on first access."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 
-class Photograph:
+class CameraImage:
     """A dataclass field that holds a path or pixels, and gives pixels: (H, W, 3) uint8, RGB, or None.
 
-    Most pipelines never look at the image, and decoding it may take longer than they do.
+    Most pipelines never use the image, and decoding it may take longer than they do.
 
     Raises
     ------
     ValueError
-        When it is looked at: the file cannot be decoded (`hybridreg.io.read_image`).
+        On first access, if the file cannot be decoded (`hybridreg.io.read_image`).
     """
 
     def __get__(self, pair: Any, owner: Any = None) -> NDArray[np.uint8] | None:
@@ -35,5 +35,5 @@ class Photograph:
 
     @staticmethod
     def held_by(pair: Any) -> Any:
-        """What the pair holds: pixels, a path that was not looked at yet, or None."""
+        """What the pair holds: pixels, a path that was not read yet, or None."""
         return pair.__dict__.get("_image")

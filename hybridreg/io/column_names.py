@@ -32,7 +32,7 @@ _SAID = re.compile(r"\bunits?\b\W*(?:is|are|in)?\W*([a-z-]+)", re.IGNORECASE)
 
 
 class Axes(NamedTuple):
-    """Where x, y and z stand, and the metres of one unit of theirs; 1 where the names tell no unit."""
+    """Columns of x, y and z, and their unit in metres; 1 where the names do not give a unit."""
 
     columns: tuple[int, int, int]
     metres: float = 1.0
@@ -68,12 +68,14 @@ def find_axes(names: Sequence[str], name: str) -> Axes | None:
     groups = list(dict.fromkeys(_groups(stems)))
     if len(groups) > 1:
         told = " and ".join(", ".join(str(names[column]) for column in group) for group in groups[:3])
-        raise fault(name, f"has several columns that may be x, y and z: {told}", "call one group x, y and z")
+        raise fault(
+            name, f"has several columns that could be x, y and z: {told}", "call one group x, y and z"
+        )
     return _with_unit(groups[0], parsed, name) if groups else None
 
 
 def axes_in(names: Sequence[str], name: str) -> Axes:
-    """As `find_axes`, where there must be some.
+    """As `find_axes`, but x, y and z must be found.
 
     Raises
     ------
@@ -94,7 +96,7 @@ def axes_in(names: Sequence[str], name: str) -> Axes:
 
 
 def unit_said(text: str) -> float:
-    """Metres of the unit that a comment such as `unit: mm` names; 1 where it names none that is known."""
+    """Metres of the unit that a comment such as `unit: mm` names; 1 where it names no known unit."""
     found = _SAID.search(text)
     return _METRES.get(found.group(1).lower(), 1.0) if found else 1.0
 

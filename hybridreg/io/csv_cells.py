@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Cells of a CSV file that a spreadsheet shows and does not run."""
+"""Cells of a CSV file that a spreadsheet displays instead of evaluating as formulas."""
 
 from __future__ import annotations
 
@@ -7,14 +7,14 @@ from typing import TypeVar
 
 Value = TypeVar("Value")
 
-# What a spreadsheet takes for the start of a formula, in ASCII and in the wide forms of the same signs.
+# What a spreadsheet takes for the start of a formula, in ASCII and in the full-width forms of these characters.
 _FORMULA = ("=", "+", "-", "@", "\t", "\r", "\n", "＝", "＋", "－", "＠")
 
 
 def cell(value: Value) -> Value | str:
-    """`value` as it may stand in a CSV file: a text that begins as a formula does, behind an apostrophe.
+    """`value` as it is safe in a CSV file: text that begins like a formula gets an apostrophe in front.
 
-    Numbers, and texts that are numbers, stay what they are.
+    Numbers, and texts that are numbers, stay as they are.
     """
     if not isinstance(value, str) or not value.lstrip(" ").startswith(_FORMULA):
         return value

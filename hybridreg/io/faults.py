@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""How a bad file is reported: its name, what is wrong with it, and the cure."""
+"""How a bad file is reported: its name, what is wrong with it, and what to do."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ def fault(name: str, problem: str, cure: str = FETCH_AGAIN) -> ValueError:
 
 
 def shorten(text: object, length: int = 60) -> str:
-    """`text` quoted for a message, cut where a damaged file would flood the screen."""
+    """`text` quoted for a message, cut short so that a damaged file does not flood the screen."""
     shown = str(text)
     return repr(shown if len(shown) <= length else shown[:length] + "...")
 
 
 @contextmanager
 def foreign_parser(name: str, kind: str) -> Iterator[None]:
-    """Turn whatever someone else's parser throws at a damaged file into one `ValueError`.
+    """Turn whatever a third-party parser raises for a damaged file into one `ValueError`.
 
     zipfile, numpy's header reader, laspy and lazrs raise a dozen kinds of exceptions on damaged bytes, and
     lazrs' Rust panics do not even derive from `Exception`. Our own parsers do not hide behind this.

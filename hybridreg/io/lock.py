@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""One writer at a time: a lock that ends with its process, however that ends, and tells others who holds it."""
+"""One writer at a time: a lock that ends with its process, however that ends, and names its holder to others."""
 
 from __future__ import annotations
 
@@ -23,19 +23,19 @@ _NAME = ".hybridreg-lock"
 
 
 class InUse(ValueError):
-    """Another process is writing there; the message tells which, and since when."""
+    """Another process is writing there; the message says which, and since when."""
 
 
 class Lock:
     """Holds the file `path` within a `with` block; what a killed writer left half written beside it is removed.
 
-    The system's own lock (flock) lies on the file, so that it ends with a killed owner. Where the file system knows
-    no locks, that the file is there is the lock: that of a process of this host that is gone is taken over, one of
-    another host must be deleted by hand; a warning tells of it.
+    The system's own lock (flock) lies on the file, so that it ends with a killed owner. Where the file system has no
+    locks, the existence of the file is the lock: one left by an ended process of this host is taken over, one of
+    another host must be deleted by hand, with a warning.
 
     Parameters
     ----------
-    path : the lock's file, which goes when the block ends
+    path : the lock file, removed when the block ends
     what : what is being written, for messages
 
     Raises
@@ -69,7 +69,7 @@ class Lock:
             self.path.unlink(missing_ok=True)
 
     def renew(self) -> None:
-        """Take the lock anew where somebody deleted its file.
+        """Take the lock again where its file was deleted.
 
         Raises
         ------
@@ -149,7 +149,7 @@ def folder_lock(folder: str | os.PathLike[str], part: str = "") -> Lock:
 
 
 def file_lock(file: str | os.PathLike[str]) -> Lock:
-    """The lock of a single file; it lies beside it."""
+    """The lock of a single file, next to it."""
     path = Path(file)
     return Lock(path.with_name(f".{path.name}{_NAME}"), os.fspath(file))
 
@@ -167,7 +167,7 @@ if hasattr(os, "register_at_fork"):
 
 
 def _flock(handle: int) -> bool:
-    # False where there are no locks; BlockingIOError where somebody else holds it.
+    # False where there are no locks; BlockingIOError where another process holds it.
     if fcntl is None:
         return False
     try:
@@ -190,5 +190,5 @@ def _told(handle: int) -> Owner | None:
     try:
         os.lseek(handle, 0, os.SEEK_SET)
         return Owner.parse(os.read(handle, 4096))
-    except OSError:  # Windows and some shares let nobody read what is locked
+    except OSError:  # Windows and some shares do not let a locked file be read
         return None

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Who is writing somewhere: a process by its number, host and beginning."""
+"""Who is writing: a process identified by its number, host and start."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from pathlib import Path
 
 @dataclass(frozen=True, kw_only=True)
 class Owner:
-    """A process that writes; `start` tells it from a later one of the same number."""
+    """A process that writes; `start` distinguishes it from a later one with the same number."""
 
     pid: int
     host: str
@@ -29,7 +29,7 @@ class Owner:
 
     @classmethod
     def parse(cls, note: bytes) -> Owner | None:
-        """The owner that a note tells; None where it is empty or half there: its writer is just coming or going."""
+        """The owner that a note names; None where it is empty or incomplete: its writer is just starting or ending."""
         try:
             return cls(**json.loads(note))
         except (ValueError, TypeError):
@@ -43,20 +43,20 @@ class Owner:
         return f"process {self.pid} on {self.host} since {self.since}"
 
     def is_gone(self) -> bool:
-        """Has it ended? Only said of processes of this host, and where the system tells."""
+        """Has it ended? Only known for processes of this host, and where the system reports it."""
         if self.host != socket.gethostname() or os.name != "posix":
             return False
         try:
             os.kill(self.pid, 0)
         except ProcessLookupError:
             return True
-        except OSError:  # somebody else's process
+        except OSError:  # another user's process
             return False
         return bool(self.start) and start_of(self.pid) != self.start
 
 
 def start_of(pid: int) -> str:
-    """When a process began, in ticks since the machine did; empty where the system does not tell (not Linux)."""
+    """When a process began, in ticks since boot; empty where the system does not report it (not Linux)."""
     if sys.platform != "linux":
         return ""
     try:

@@ -77,7 +77,7 @@ _SEVERAL = (".bag", ".db3", ".mcap", ".e57", ".lvx2")
 
 
 def read_points(path: str | os.PathLike[str]) -> NDArray[np.float64]:
-    """Read the coordinates of a point cloud, in the file's own frame; metres where it tells another unit.
+    """Read the coordinates of a point cloud in the file's own frame, converted to metres where the file gives a unit.
 
     The file name's ending chooses the format: `.ply` (ascii, binary), `.pcd` (ascii, binary,
     binary_compressed), `.bin` (float32 rows of three to six numbers, as KITTI and nuScenes have four and five),
@@ -141,7 +141,7 @@ def holds_several(path: str | os.PathLike[str]) -> bool:
 
 
 def read_viewpoint(path: str | os.PathLike[str]) -> NDArray[np.float64] | None:
-    """Where the sensor stood, (3,) in the file's own frame and unit, as a `.pcd` file may tell; else None.
+    """Where the sensor stood, (3,) in the file's own frame and unit, as a `.pcd` file may give it; otherwise None.
 
     Raises
     ------

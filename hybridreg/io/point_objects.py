@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Objects that hold points, as drivers, kits and tools hand them out: known by what they have, without imports."""
+"""Objects that hold points, from drivers, development kits and tools: recognised by their attributes, without
+imports."""
 
 from __future__ import annotations
 
@@ -22,12 +23,12 @@ _CURE = "pass an array of shape (N, 3), such as numpy.column_stack([x, y, z])"
 
 
 def points_of(x: Any, name: str, depth: int = 0) -> Array:
-    """Coordinates (N, 3), a copy, of whatever holds them; what is masked or missing is NaN.
+    """Coordinates (N, 3), a copy, of whatever holds them; masked or missing values are NaN.
 
     Raises
     ------
     ValueError
-        Nothing there holds points, or it is a mesh, which is no cloud; the message tells what to pass instead.
+        Nothing there holds points, or it is a mesh and not a cloud; the message says what to pass instead.
     """
     if isinstance(x, np.ndarray):
         return _from_array(x, name)
@@ -109,7 +110,7 @@ def _held(x: Any) -> Any:
 
 
 def _named_rows(rows: Any) -> Any:
-    # What is read by position is read wrongly where the rows tell names.
+    # Reading by position would be wrong where the rows have names.
     first = rows[0]
     if isinstance(first, Mapping):
         return {key: [row.get(key) for row in rows] for key in first}
@@ -124,7 +125,7 @@ def _named_rows(rows: Any) -> Any:
 
 def _refuse_mesh(x: Any, name: str) -> None:
     if hasattr(x, "geometry") and callable(getattr(x, "to_mesh", None)):
-        _refuse(x, name, "a scene is no cloud; sample its surfaces: x.to_mesh().sample(100_000)")
+        _refuse(x, name, "a scene is not a cloud; sample its surfaces: x.to_mesh().sample(100_000)")
     if not any(hasattr(x, each) for each in ("triangles", "triangle", "faces")) or _has_no_faces(x):
         return
     sample = "sample_points_uniformly" if hasattr(x, "sample_points_uniformly") else "sample"
@@ -136,7 +137,7 @@ def _refuse_mesh(x: Any, name: str) -> None:
         else "x.points"
     )
     how = f"sample its surface, x.{sample}(100_000)" if hasattr(x, sample) else "sample its surface"
-    _refuse(x, name, f"a mesh is no cloud; {how}, or pass its vertices, {where}, where they lie densely")
+    _refuse(x, name, f"a mesh is not a cloud; {how}, or pass its vertices, {where}, where they lie densely")
 
 
 def _has_no_faces(x: Any) -> bool:
@@ -148,7 +149,7 @@ def _has_no_faces(x: Any) -> bool:
 
 def _as_array(x: Any, name: str) -> NDArray[Any]:
     if isinstance(x, (bytes, bytearray)):
-        _refuse(x, name, "bytes tell no type; pass numpy.frombuffer(x, dtype).reshape(-1, 3)")
+        _refuse(x, name, "bytes have no type; pass numpy.frombuffer(x, dtype).reshape(-1, 3)")
     array = np.ma.asarray(x) if np.ma.isMaskedArray(x) else np.asarray(x)
     if array.ndim == 0 and array.dtype.kind in "OUS":
         read = callable(getattr(x, "read", None))

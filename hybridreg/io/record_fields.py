@@ -24,7 +24,7 @@ def whole_number(text: str, name: str, what: str) -> int:
 
 
 def axis_columns(fields: Sequence[str], name: str) -> tuple[int, int, int]:
-    """Where x, y and z stand among `fields`, in upper or lower case."""
+    """Indices of x, y and z among `fields`, in upper or lower case."""
     lowered = [field.lower() for field in fields]
     for axis in AXES:
         if lowered.count(axis) != 1:

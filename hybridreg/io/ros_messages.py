@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""ROS' sensor_msgs/PointCloud2, without ROS: any object with its fields."""
+"""ROS's sensor_msgs/PointCloud2 without ROS: any object with its fields."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _TYPES = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 8: "f8"
 
 
 def is_cloud(x: Any) -> bool:
-    """Whether an object has what a PointCloud2 has."""
+    """Whether an object has the fields of a PointCloud2."""
     return all(hasattr(x, each) for each in _HAS)
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Weights that come with the package: which there are, told without torch."""
+"""Weights that come with the package: which there are, found without torch."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
-CONFIG_FILE, WEIGHTS_FILE = "config.json", "model.safetensors"
+CONFIG_FILE = "config.json"
+WEIGHTS_FILE = "model.safetensors"
 
 
 class MissingWeights(FileNotFoundError):
@@ -39,7 +40,7 @@ def require(slots: Mapping[str, Any], what: str) -> None:
     Raises
     ------
     MissingWeights
-        It tells the name and where to get weights.
+        It names them and says where to get weights.
     """
     named = {slot: _weights_of(stage) for slot, stage in slots.items()}
     missing = {

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What a file is by its first bytes, whatever its name says."""
+"""The kind of a file by its first bytes, whatever its name says."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _NO_CLOUD = "give the point cloud's own file"
 class Kind:
     """A recognised kind of file.
 
-    `suffix` is set where another of our readers takes it; `cure` tells what to do with the others.
+    `suffix` is set where another of our readers takes it; `cure` says what to do with the others.
     """
 
     words: str

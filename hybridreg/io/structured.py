@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""TOML and JSON of any origin: what cannot be parsed is one `ValueError` that names it, whatever the parser raises."""
+"""TOML and JSON from any source: what cannot be parsed raises one `ValueError` that names it, whatever the parser
+raises."""
 
 from __future__ import annotations
 

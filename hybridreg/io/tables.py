@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Tables of points, whoever made them: columns called x, y and z of pandas, polars, pyarrow, xarray or a dictionary."""
+"""Tables of points: columns called x, y and z of pandas, polars, pyarrow, xarray or a dictionary."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _UNNAMED = re.compile(r"(column_?|f|v|_)?\d+", re.IGNORECASE)
 
 
 def labels(x: Any) -> list[Any] | None:
-    """Names of a table's columns; None for what is no table."""
+    """Names of a table's columns; None for anything that is not a table."""
     if isinstance(x, Mapping):
         return list(x.keys())
     if hasattr(x, "data_vars"):  # xarray's Dataset, where x may be a coordinate of its own
@@ -40,12 +40,12 @@ def labels(x: Any) -> list[Any] | None:
 def points(x: Any, names: list[Any], name: str) -> Array:
     """x, y and z by their names (`hybridreg.io.column_names`); by position where no column was named; shape (N, 3).
 
-    What is missing becomes NaN.
+    Missing values become NaN.
 
     Raises
     ------
     ValueError
-        No columns, or several, that may be x, y and z; columns of unequal length, or of no numbers.
+        No columns, or several, that could be x, y and z; columns of unequal length, or without numbers.
     """
     told = [str(each[-1]) if isinstance(each, tuple) else str(each) for each in names]
     if len(names) >= 3 and all(_UNNAMED.fullmatch(each) for each in told) and find_axes(told, name) is None:

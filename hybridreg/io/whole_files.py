@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Reading a file's bytes, with an error that says what lies at the path instead of a file."""
+"""Reading a file's bytes, with an error that says what is at the path instead of a file."""
 
 from __future__ import annotations
 

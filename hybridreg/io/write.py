@@ -28,10 +28,10 @@ def write_points(
     path : path
         Ends in `.ply` or `.pcd`.
     points : array of shape (N, 3)
-        Written as they are, also where they are not finite.
+        Written as they are, even where they are not finite.
     dtype : {"float64", "float32"}, optional
-        By default PLY is written as float64, which loses nothing, and PCD as float32, because Open3D reads
-        the coordinates of a float64 PCD as zeros without a word. A PCD whose points float32 would move by
+        By default PLY is written as float64, which loses nothing, and PCD as float32, because Open3D silently reads
+        the coordinates of a float64 PCD as zeros. A PCD whose points float32 would move by
         more than a millimetre (map-grid coordinates) is refused unless a dtype is given.
 
     Raises
@@ -80,7 +80,7 @@ def write_json(path: str | os.PathLike[str], record: object) -> None:
     Raises
     ------
     ValueError
-        A NaN or an infinity, which JSON does not have, or an object that JSON cannot express.
+        A NaN or an infinity, which JSON does not have, or an object that JSON cannot represent.
     """
     try:
         text = json.dumps(record, indent=2, allow_nan=False, ensure_ascii=False, default=_plain)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Pipelines by name: TOML files beside this one, in the format that `Pipeline.save` writes."""
+"""Pipelines by name: TOML files next to this one, in the format that `Pipeline.save` writes."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def read(path: str | os.PathLike[str]) -> dict[str, Any]:
     FileNotFoundError
         There is no such file.
     ValueError
-        Not TOML, or a table that is no slot.
+        Not TOML, or a table that is not a slot.
     """
     from hybridreg.io.structured import read_toml
 
@@ -69,6 +69,6 @@ def _slots(tables: dict[str, Any], origin: str) -> dict[str, Any]:
     unknown = set(tables) - {*SLOTS, "voxel", "prior"}
     if unknown:
         raise ValueError(
-            f"{origin}: {', '.join(sorted(unknown))} is no slot; the slots are {', '.join(SLOTS)}"
+            f"{origin}: {', '.join(sorted(unknown))} is not a slot; the slots are {', '.join(SLOTS)}"
         )
     return tables

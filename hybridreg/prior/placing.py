@@ -50,18 +50,18 @@ def sized(cloud: PointCloud, scale: float) -> PointCloud:
     )
 
 
-def within_box(cloud: PointCloud, low: Array, high: Array, name: str) -> PointCloud:
-    """The points between two corners (3,), (3,) in the user's coordinates.
+def within_box(cloud: PointCloud, box: Array, name: str) -> PointCloud:
+    """The points in a box (6,), its lowest corner and its highest one, in the user's coordinates.
 
     Raises
     ------
     ValueError
         Fewer remain than a pose needs.
     """
-    low, high = low - cloud.offset, high - cloud.offset
+    low, high = box[:3] - cloud.offset, box[3:] - cloud.offset
     words = f"crop: the box of {_corner(low + cloud.offset)} to {_corner(high + cloud.offset)}"
-    inside = np.all((cloud.points >= low) & (cloud.points <= high), axis=1)
-    return _kept(cloud, np.asarray(inside), name, words)
+    inside = np.asarray(((cloud.points >= low) & (cloud.points <= high)).all(axis=1))
+    return _kept(cloud, inside, name, words)
 
 
 def within_radius(cloud: PointCloud, middle: Array, radius: float, name: str) -> PointCloud:

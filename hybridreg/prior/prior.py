@@ -19,9 +19,9 @@ from hybridreg.pair import Pair
 from hybridreg.prior import placing, size_search
 
 Array = NDArray[np.float64]
-# A start is often written down with few digits: a rotation that is off by less is meant as one, and is made exact
+# A start is often written down with two digits: a rotation that is off by less is meant as one, and is made exact
 # unless it is so already.
-_ROUNDED, _EXACT = 0.01, 1e-12
+_ROUNDED, _EXACT = 0.03, 1e-12
 _Z = np.array([0.0, 0.0, 1.0])
 
 
@@ -109,11 +109,9 @@ class Prior:
         source, target = pair.source, pair.target
         crop = self.crop or {}
         if "source" in crop:
-            low, high = np.reshape(crop["source"], (2, 3))
-            source = placing.within_box(source, low, high, "source")
+            source = placing.within_box(source, np.array(crop["source"]), "source")
         if "target" in crop:
-            low, high = np.reshape(crop["target"], (2, 3))
-            target = placing.within_box(target, low, high, "target")
+            target = placing.within_box(target, np.array(crop["target"]), "target")
         if "radius" in crop:
             middle = se3.apply(start, (np.median(source.points, axis=0) + source.offset)[None])[0]
             target = placing.within_radius(target, middle, crop["radius"], "target")

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: MIT
-"""The machine and the packages on it: cores, threads, processes, memory, optional packages."""
+"""The machine and its packages: cores, threads, processes, memory, optional packages."""

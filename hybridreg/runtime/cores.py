@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""How many cores this process may use: what its affinity and its control group leave of the machine's."""
+"""How many cores this process may use, by its affinity and its control group."""
 
 from __future__ import annotations
 
@@ -8,37 +8,37 @@ import os
 from functools import lru_cache
 from pathlib import Path
 
-# Points of a query that are shared among threads.
+# Points in a KD-tree query from which it is split among threads.
 _MANY = 4_000
 _CGROUPS = Path("/sys/fs/cgroup")
 _OWN_CGROUPS = Path("/proc/self/cgroup")
 
 
 def cores() -> int:
-    """Cores on which this thread may run (`taskset`, `cpuset`), at most as many as its quota of time fills."""
+    """Cores on which this thread may run (`taskset`, `cpuset`), at most as many as its CPU quota allows."""
     allowed = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     return math.ceil(min(allowed, _quota()))
 
 
 def n_threads() -> int:
-    """Threads for one call of a library: OMP_NUM_THREADS, as numpy and OpenMP take it, but no more than `cores`."""
+    """Threads for one library call: OMP_NUM_THREADS, as numpy and OpenMP read it, but no more than `cores`."""
     said = os.environ.get("OMP_NUM_THREADS", "").partition(",")[0]
     return min(int(said), cores()) if said.isdigit() and int(said) > 0 else cores()
 
 
 def query_threads(n: int) -> int:
-    """Threads for a KD-tree query of n points: to start them takes as long as to ask for a thousand points."""
+    """Threads for a KD-tree query of n points: starting them takes as long as querying a thousand points."""
     return n_threads() if n > _MANY else 1
 
 
 @lru_cache(maxsize=1)
 def _quota() -> float:
-    # It hardly ever changes while a process runs, and every search in a tree asks.
+    # It hardly ever changes while a process runs, and every tree query needs it.
     return quota(_OWN_CGROUPS, _CGROUPS)
 
 
 def quota(own: Path, root: Path) -> float:
-    """Cores' worth of time that control groups leave to a process; infinite where none limits it.
+    """CPU quota of a process in cores, from its control groups; infinite where there is no limit.
 
     Parameters
     ----------
@@ -54,7 +54,7 @@ def quota(own: Path, root: Path) -> float:
         base = root / controllers if controllers else root
         if controllers and "cpu" not in controllers.split(","):
             continue
-        # A group's quota binds all below it. In a container the path may be that of the host and lead nowhere.
+        # A group's quota applies to all groups below it. In a container the path may be the host's, and not exist.
         folder = base / path.strip("/")
         for place in {folder, *folder.parents}:
             if place == base or base in place.parents:

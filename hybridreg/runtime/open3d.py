@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The one place that imports open3d."""
+"""The only place that imports open3d."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from hybridreg.runtime.optional_packages import cure
 
 
 def load_open3d() -> ModuleType:
-    """Import open3d, also on a Linux machine that lacks the system's libusb.
+    """Import open3d, even on a Linux machine without the system's libusb.
 
     Raises
     ------
@@ -29,7 +29,7 @@ def load_open3d() -> ModuleType:
 
 
 def _load_with_bundled_libusb() -> ModuleType:
-    # The open3d wheel links against libusb and does not carry it; the libusb-package wheel does. Loading that
+    # The open3d wheel links against libusb without including it; the libusb-package wheel includes it. Loading that
     # copy globally first lets the dynamic linker find the symbols by the library's name.
     try:
         libusb = importlib.import_module("libusb_package")

@@ -43,7 +43,7 @@ def load(module: str, purpose: str) -> Any:
     Raises
     ------
     ImportError
-        One sentence that tells who needs it, and how to get it on this Python, or that it cannot be had.
+        One sentence that says what needs it, and how to get it on this Python, or that there is no wheel for it.
     """
     try:
         return importlib.import_module(module)
@@ -86,14 +86,14 @@ def left_out_unless_installed(what: str) -> Iterator[None]:
 
 
 def left_out(method: Any) -> str:
-    """Which recipes of a method of several (`Candidates`) will be left out for want of a package; empty if none."""
+    """Which entries of a method of several (`Candidates`) will be skipped for lack of a package; empty if none."""
     lacking = dict.fromkeys(
         module
         for stage in _stages(method)
         for entry in getattr(stage, "of", ())
         for module in _lacking(entry.values() if isinstance(entry, Mapping) else ())
     )
-    return "; ".join(f"recipes that need {cure(module)}" for module in lacking)
+    return "; ".join(f"entries that need {cure(module)}" for module in lacking)
 
 
 def _lacking(stages: Any) -> Iterator[str]:
@@ -108,7 +108,7 @@ def _is_here(module: str) -> bool:
 
 
 def _stages(method: Any) -> list[Any]:
-    pipeline = getattr(method, "pipeline", method)  # a control's
+    pipeline = getattr(method, "pipeline", method)  # of a control
     return [
         getattr(pipeline, slot, None) for slot in ("downsample", "overlap", "match", "estimate", "refine")
     ]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Loading what other packages bring: a broken one is an `ImportError` that names it, whatever its import does."""
+"""Loading plug-ins of other packages: a broken one is an `ImportError` that names it, whatever its import does."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ def load(target: str, what: str, group: str) -> Any:
     Parameters
     ----------
     target : "module:attribute"
-    what : as messages call it
+    what : what messages call it
     group : the entry points' group
 
     Raises
     ------
     ImportError
-        Its import raised something or ended the process, or there is no such attribute.
+        Its import raised an exception or tried to end the process, or there is no such attribute.
     """
     module, _, attribute = target.partition(":")
     try:
@@ -28,9 +28,9 @@ def load(target: str, what: str, group: str) -> Any:
     except KeyboardInterrupt:
         raise
     except BaseException as error:
-        # SystemExit too: a plug-in must not end whoever looks for it.
+        # SystemExit too: a plug-in must not end the process that loads it.
         reason = " ".join(f"{type(error).__name__}: {error}".split())[:200]
         raise ImportError(
-            f"{what} ({target}) of a plug-in cannot be loaded: {reason}; mend or uninstall the package that "
+            f"{what} ({target}) of a plug-in cannot be loaded: {reason}; repair or uninstall the package that "
             f"registers it in {group!r}"
         ) from error

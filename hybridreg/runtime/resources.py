@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Seconds of each stage, and the highest memory of a run."""
+"""Seconds of each stage, and the peak memory of a run."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class Clock:
 
 
 def reset_peak_memory() -> None:
-    """Start counting peak memory anew, where the system can (Linux)."""
+    """Reset the peak memory counter, where the system can (Linux)."""
     try:
         (_PROCESS / "clear_refs").write_text("5")
     except OSError:

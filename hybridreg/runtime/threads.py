@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""Hold outside code to the calling thread: on a busy machine, in a forked process, for the same bits everywhere.
+"""Keep third-party code on the calling thread: on a busy machine, in a forked process, for the same bits everywhere.
 
-Threads of OpenMP, BLAS and torch wait for each other by spinning, many times in one call. Where a neighbour takes a
-core away they wait for the scheduler each time: the network of the preset `cross3dreg` took 5 to 8 s on two threads and
-1 s on one (two cores, three busy neighbours), three times the processor's time. And those of OpenMP do not live on in a
-forked process, which then waits for them for ever.
+Threads of OpenMP, BLAS and torch wait for each other by spinning, many times in one call. Where another process takes
+a core away they wait for the scheduler each time: the network of the preset `cross3dreg` took 5 to 8 s on two threads
+and 1 s on one (two cores, three other busy processes), at three times the processor time. And OpenMP's threads do not
+exist in a forked process, which then waits for them forever.
 """
 
 from __future__ import annotations
@@ -23,9 +23,9 @@ _VARIABLES = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUM
 
 
 class _Held:
-    """A setting of the whole process: changed by the first block that wants it, given back by the last.
+    """A setting of the whole process: changed by the first block that needs it, restored by the last.
 
-    So blocks in several Python threads do not give back each other's values, whatever order they end in.
+    So blocks in several Python threads do not restore each other's values, in whatever order they end.
     """
 
     def __init__(self, change: Callable[[], Callable[[], Any]]) -> None:
@@ -59,7 +59,7 @@ class _Held:
         return depth
 
     def _after_fork(self) -> None:
-        # The thread that held the lock, and the blocks of all other threads, are not in this process.
+        # The thread that held the lock, and the blocks of all other threads, do not exist in this process.
         self._lock = threading.Lock()
         left, self._inside = self._inside, self._depth
         if left and not self._inside:
@@ -69,7 +69,7 @@ class _Held:
 def _limit(kind: Literal["blas", "openmp"]) -> Any:
     from threadpoolctl import ThreadpoolController
 
-    # Selected first: `threadpool_limits(user_api=...)` gives back the numbers of the other kind too.
+    # Selected first: `threadpool_limits(user_api=...)` restores the numbers of the other kind too.
     return ThreadpoolController().select(user_api=kind).limit(limits=1)
 
 
@@ -79,8 +79,8 @@ def _limit_blas() -> Callable[[], Any]:
 
 
 def _limit_torch() -> Callable[[], Any]:
-    # torch keeps one number for the process and one for each thread, and changes both at once. A thread of its own
-    # reads and changes the process's; the caller's is one of OpenMP's.
+    # torch keeps one number for the process and one for each thread, and changes both at once. A separate thread reads
+    # and changes the process's; the caller's is one of OpenMP's.
     import torch
 
     def swapped(n: int) -> int:
@@ -117,10 +117,10 @@ _one_blas, _one_torch, _one_said = _Held(_limit_blas), _Held(_limit_torch), _Hel
 
 @contextmanager
 def single() -> Iterator[None]:
-    """One thread for the libraries that are loaded, within the block; afterwards what was there before.
+    """One thread for the libraries that are loaded, within the block; afterwards the previous numbers are restored.
 
     OpenMP counts threads for each Python thread, BLAS and torch for the whole process. A library that is imported
-    within the block goes its own way: import it before.
+    within the block is not limited: import it before.
     """
     with ExitStack() as held:
         held.enter_context(_limit("openmp"))
@@ -134,13 +134,13 @@ def single() -> Iterator[None]:
 
 @contextmanager
 def one_thread() -> Iterator[None]:
-    """`single`, also for libraries that are loaded later and for our own searches: one core for the block."""
+    """`single`, also for libraries that are loaded later and for our own tree queries: one core for the block."""
     new = "torch" not in sys.modules
     try:
         with _one_said(), single():
             yield
     finally:
-        if new and "torch" in sys.modules:  # it read the variables, and would keep to one thread for ever
+        if new and "torch" in sys.modules:  # it read the variables, and would keep to one thread forever
             sys.modules["torch"].set_num_threads(n_threads())
 
 

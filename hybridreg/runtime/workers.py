@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Work spread over processes that end with the one that started them, however that ends."""
+"""Work spread over processes that end with the one that started them, however it ends."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from typing import Any, Literal, TypeVar
 
 T = TypeVar("T")
 
-# How often a worker looks whether its leader still lives, seconds.
+# Seconds between a worker's checks that its leader is still alive.
 _LOOK = 0.25
 _watching = False
 _process = _seen = os.getpid()
@@ -28,13 +28,13 @@ def spread(
     ordered: bool = False,
     singly: bool = False,
 ) -> Iterator[T]:
-    """What `function` gives for each tuple of arguments, by joblib.
+    """Results of `function` for each tuple of arguments, through joblib.
 
     Parameters
     ----------
     workers : processes; None takes what `joblib.parallel_config` says, else 1
-    ordered : in the order of the jobs, else as they are done
-    singly : one job a task, so that each result comes as soon as it is there
+    ordered : in the order of the jobs, otherwise as they finish
+    singly : one job a task, so that each result comes as soon as it is ready
 
     Warns
     -----
@@ -44,7 +44,7 @@ def spread(
     from joblib import Parallel, delayed
     from joblib.parallel import get_active_backend
 
-    # On dask joblib (1.6) takes all cores whatever `n_jobs` says; but no more than `pre_dispatch` tasks wait or run.
+    # With dask, joblib (1.6) takes all cores whatever `n_jobs` says; but no more than `pre_dispatch` tasks wait or run.
     wanted = get_active_backend()[1] if workers is None else workers
     ahead = wanted if wanted is not None and wanted > 0 else "2*n_jobs"
     many: dict[str, Any] = {"batch_size": 1, "pre_dispatch": ahead} if singly else {}
@@ -57,9 +57,9 @@ def spread(
 
 @contextmanager
 def _own_workers() -> Iterator[None]:
-    """Within the block joblib's loky starts workers of this process; where it is a child, they end with the block.
+    """Within the block joblib's loky starts workers for this process; in a child process they end with the block.
 
-    loky (joblib 1.6) keeps its workers for the next call. A forked process would wait for ever for those of its parent,
+    loky (joblib 1.6) keeps its workers for the next call. A forked process would wait forever for those of its parent,
     and one of multiprocessing's waits at its end until its own have been idle for five minutes.
     """
     global _seen
@@ -67,7 +67,7 @@ def _own_workers() -> Iterator[None]:
 
     if _seen != os.getpid():
         _seen = os.getpid()
-        # Kept, as its end would be told to threads that are not in this process.
+        # Kept, because its end would be signalled to threads that do not exist in this process.
         _parents.append(getattr(reusable_executor, "_executor", None))
         reusable_executor._executor = None
     try:
@@ -85,9 +85,9 @@ def led(leader: int, function: Callable[..., T], job: tuple[Any, ...]) -> T:
 
 
 def end_with(leader: int) -> None:
-    """Have this process end when its leader has, if it is a child of the leader's; of others nothing is known.
+    """End this process when its leader has ended, if it is a child of the leader; of others nothing is known.
 
-    A thread looks for it. Linux could signal it, but does so as soon as the *thread* ends that started the child.
+    A thread checks for it. Linux could signal it, but does so as soon as the *thread* that started the child ends.
     """
     global _watching
     if _watching or os.name != "posix" or os.getpid() == leader:
@@ -96,7 +96,7 @@ def end_with(leader: int) -> None:
         _watching = True
         threading.Thread(target=_watch, args=(leader,), daemon=True, name="leader-watch").start()
     elif multiprocessing.current_process().name.startswith("Loky"):
-        os._exit(1)  # such a process is always its leader's child: the leader has gone already
+        os._exit(1)  # such a process is always its leader's child: the leader has already ended
 
 
 def _watch(leader: int) -> None:

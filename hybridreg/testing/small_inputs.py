@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Small made inputs for tests of stages."""
+"""Small synthetic inputs for tests of stages."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ Array = NDArray[np.float64]
 
 
 def sample_pair(seed: int = 0, n_points: int = 3000) -> tuple[Pair, Array]:
-    """A small made scene that two sensors saw in part: the pair, and its true pose (4, 4)."""
+    """A small synthetic scene that two sensors saw in part: the pair, and its true pose (4, 4)."""
     rng = np.random.default_rng(seed)
     world = _courtyard(rng, n_points)
     T = se3.from_rt(se3.rotation_about(np.array([0.02, -0.01, 0.4])), np.array([1.5, -1.0, 0.1]))
@@ -50,7 +50,7 @@ def _courtyard(rng: np.random.Generator, n: int) -> Array:
 
 
 def true_matches(scene: Scene, T: Array, n: int = 120) -> Correspondences:
-    """Right matches in eight groups, and one wrong match in five."""
+    """Correct matches in eight groups; one match in five is wrong."""
     rng = np.random.default_rng(0)
     rows = np.sort(rng.choice(len(scene.source), n, replace=False))
     source = scene.source.points[rows]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What every stage owes its pipeline, as checks."""
+"""The contract of a stage, as checks."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ Check = Callable[[Any, str], None]
 
 
 def checks() -> list[Check]:
-    """The single checks, for `pytest.mark.parametrize`."""
+    """The individual checks, for `pytest.mark.parametrize`."""
     return [
         check_parameters,
         check_pickle_and_clone,
@@ -74,8 +74,8 @@ def slot_of(stage: Any) -> str:
 
 
 def check_parameters(stage: Any, slot: str) -> None:
-    """A mistyped keyword is refused at once."""
-    assert slot in SLOTS, f"{slot!r} is no slot; the slots are {', '.join(SLOTS)}"
+    """A misspelled keyword is refused at once."""
+    assert slot in SLOTS, f"{slot!r} is not a slot; the slots are {', '.join(SLOTS)}"
     try:
         type(stage)(this_is_no_parameter=1)
     except TypeError:
@@ -96,7 +96,7 @@ def check_pickle_and_clone(stage: Any, slot: str) -> None:
 
 
 def check_output(stage: Any, slot: str) -> None:
-    """Returns the slot's type, with the shapes that it promises; leaves its inputs as they were."""
+    """Returns the slot's type, with the promised shapes; leaves its inputs unchanged."""
     scene, _ = sample_scene()
     before = scene.source.points.copy(), scene.target.points.copy()
     out = _run(stage, slot, scene)
@@ -113,7 +113,7 @@ def check_seed(stage: Any, slot: str) -> None:
 
 
 def check_permuted_points(stage: Any, slot: str) -> None:
-    """The order of the points does not matter beyond the draw of random samples."""
+    """The order of the points does not matter except for random sampling."""
     scene, _ = sample_scene()
     order = np.random.default_rng(1).permutation(len(scene.source))
     shuffled = Level(
@@ -137,7 +137,7 @@ def check_permuted_points(stage: Any, slot: str) -> None:
 
 
 def check_rigid_motion(stage: Any, slot: str) -> None:
-    """A turned source turns the pose with it; an estimator that ignores the clouds is exempt."""
+    """Rotating the source rotates the pose accordingly; an estimator that ignores the clouds is exempt."""
     if slot != "estimate" or not getattr(stage, "needs", frozenset()) & {"matches", "group"}:
         return
     scene, truth = sample_scene()
@@ -175,7 +175,7 @@ def check_no_matches(stage: Any, slot: str) -> None:
 
 
 def check_one_match(stage: Any, slot: str) -> None:
-    """One match fixes no pose; the estimator must not crash on it."""
+    """One match determines no pose; the estimator must not crash on it."""
     if slot == "estimate":
         scene, truth = sample_scene()
         one = true_matches(scene, truth, n=1)

@@ -12,21 +12,23 @@ from hybridreg.config import limits
 from hybridreg.config.plain_values import build
 from hybridreg.learned.kpfcnn.kpfcnn_config import KpfcnnConfig, architecture
 
-_WIDEST, _MOST_PAIRS = 8192, 1_000_000
+# A configuration may come with untrusted weights: absurd sizes are refused before memory is allocated. By hand.
+_WIDEST = 8192  # channels
+_MOST_PAIRS = 1_000_000  # of superpoints
 
 
 @dataclass(frozen=True, kw_only=True)
 class SelectionConfig:
-    """Which pairs of superpoints go on, at inference.
+    """Which superpoint pairs are kept for point matching, at inference.
 
-    Pairs above a probability; while there are too few the threshold falls, step by step. In the released code it falls
-    below 0, where every pair goes on, and where there are not so many it falls for ever; here it stops there.
+    Pairs above a probability; while there are too few the threshold is lowered step by step. In the released code it
+    falls below 0, where every pair is kept, and loops forever where there are fewer pairs; here it stops there.
     """
 
     threshold: float = 0.2
     step: float = 0.01
     min_pairs: int = 200
-    max_pairs: int | None = 2000  # the likeliest ones, so that memory stays bounded; ours
+    max_pairs: int | None = 2000  # the most probable ones, so that memory stays bounded; ours
 
     def __post_init__(self) -> None:
         limits.within(self, 0.0, 1.0, "threshold")
@@ -42,7 +44,7 @@ class CofinetLossConfig:
 
     pairs: int = 128  # true pairs of superpoints drawn a step, with replacement
     patch_points: int = 64  # of a patch in training
-    min_overlap: float = 0.2  # pairs of superpoints of this weight or less are no pairs; 0 indoors
+    min_overlap: float = 0.2  # superpoint pairs with at most this weight are not pairs; 0 indoors
     overlap_radius: float = 0.45
     fine_radius: float = 0.5
     coarse_weight: float = 1.0
@@ -59,18 +61,19 @@ class CofinetLossConfig:
 class CofinetConfig:
     """A whole network; the defaults are KITTI's as published, but for ``padding`` and ``patch_rule``.
 
-    ``padding`` says what the empty places of a patch that is not full hold. "point0" is what the released weights were
+    ``padding`` says what the empty slots of a patch contain. "point0" is what the released weights were
     trained with and are loaded with: the features of the cloud's point 0, which take part in the attention, in its
-    normalisation, and in deciding which training point has no partner. "masked" is the right one: they take no part.
+    normalisation, and in deciding which training point has no correspondence. "masked" is the correct one: they take no
+    part.
 
-    ``patch_rule`` says which points of a superpoint make up a patch that overflows: "nearest" to it, or the "first" as
-    they are numbered. The released code overwrites places at random, seeded by the clock: no run equals another.
+    ``patch_rule`` says which points of a superpoint make up a patch that overflows: "nearest" to it, or the "first" by
+    index. The released code overwrites slots at random, seeded by the clock: no two runs are equal.
     """
 
     backbone: KpfcnnConfig = field(
         default_factory=lambda: KpfcnnConfig(blocks=architecture((1, 1, 1, 1)), init_dim=128)
     )
-    dim: int = 256  # of the superpoint features; the points' have half of it, halved again with each stage
+    dim: int = 256  # width of the superpoint features; that of the points is halved with each stage
     heads: int = 4
     fine_heads: int = 4
     sinkhorn_iterations: int = 100
@@ -100,7 +103,7 @@ class CofinetConfig:
 
     @property
     def image(self) -> None:
-        """It looks at no image."""
+        """It uses no image."""
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values that `from_dict` and JSON take back."""

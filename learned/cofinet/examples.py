@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What a training step of CoFiNet looks at."""
+"""Training examples of CoFiNet."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""CoFiNet's two losses, and how good the answers are."""
+"""CoFiNet's two losses, and the quality of its matches (docs/methods.md 11.3)."""
 
 from __future__ import annotations
 
@@ -17,25 +17,25 @@ _FOUND = 0.1
 
 @dataclass(frozen=True, kw_only=True)
 class CofinetLosses:
-    """The parts of the training loss, and two measures of the answers."""
+    """The parts of the training loss, and two measures of the matches."""
 
     coarse: Tensor
     fine: Tensor
     total: Tensor  # with the configuration's weights
-    # As published, and no share: true pairs of superpoints above 0.1, by the sum of all weights, the slack's included.
-    # A perfect answer may have less or more than 1.
+    # As published, and not a share: true superpoint pairs above 0.1, over the sum of all weights including the
+    # slack's. A perfect result may have less or more than 1.
     coarse_recall: Tensor
-    # Share of the true ones among a pair's matches, mean over the drawn pairs; a pair without matches counts as 0.
+    # Share of correct matches of a patch pair, mean over the drawn pairs; a pair without matches counts as 0.
     fine_precision: Tensor
 
     @property
     def parts(self) -> dict[str, Tensor]:
-        """Before they are weighed, for the log."""
+        """Before weighting, for the log."""
         return {"coarse": self.coarse, "fine": self.fine}
 
     @property
     def hits(self) -> Tensor:
-        """The precision of the points' matches."""
+        """The precision of the point matches."""
         return self.fine_precision
 
 
@@ -62,18 +62,18 @@ def cofinet_losses(
 
 
 def transport_loss(log_assignment: Tensor, weights: Tensor) -> Tensor:
-    """Mean of the negative log-assignment with the weights of the truth, the slack included."""
+    """Mean of the negative log-assignment with the true weights, including the slack."""
     return -(log_assignment * weights).sum() / weights.sum().clamp_min(1e-9)
 
 
 def coarse_recall(log_assignment: Tensor, weights: Tensor) -> Tensor:
-    """True pairs with a probability above 0.1, by the sum of all weights."""
+    """True pairs with a probability above 0.1, over the sum of all weights."""
     found = (log_assignment.exp() > _FOUND) & (weights > 0)
     return found[:-1, :-1].sum() / weights.sum().clamp_min(1e-9)
 
 
 def fine_precision(log_assignment: Tensor, truth: Tensor) -> Tensor:
-    """Share of the true ones among the matches of each pair, mean over the pairs."""
+    """Share of correct matches of each pair, mean over the pairs."""
     if len(truth) == 0:
         return torch.zeros((), device=truth.device)
     chosen = either_best(log_assignment)

@@ -31,7 +31,7 @@ from hybridreg.learned.pretrained import Pretrained
 from hybridreg.learned.weights import load_official_tensors
 
 _FLOAT = 4
-# Pairs of patches worked on at a time: the attention of so many stays small.
+# Patch pairs processed at a time: their attention stays small.
 _CHUNK = 256
 
 
@@ -47,7 +47,7 @@ class CofinetCloud:
 
 @dataclass(frozen=True, kw_only=True)
 class CofinetEncoding:
-    """A pair after the encoders: all that training and matching look at."""
+    """A pair after the encoders: all that training and matching need."""
 
     target: CofinetCloud
     source: CofinetCloud
@@ -67,7 +67,7 @@ class CofinetOutput:
 
 
 class CofinetNetwork(Pretrained):
-    """Features and matches of a pair. No part of it takes a ground truth.
+    """Features and matches of a pair. No part of it takes the ground truth.
 
     Exchanging source and target changes the numbers: the source attends first, and each transport normalises its rows
     first. `encode` is all that a training step needs: `losses` takes its result as well as an output.
@@ -77,7 +77,7 @@ class CofinetNetwork(Pretrained):
     config
         The network; ``named_config`` has the published one.
     seed
-        Fixes how the kernel points are turned. The weights follow torch's generator.
+        Fixes the rotation of the kernel points. The weights follow torch's generator.
     """
 
     name: ClassVar[str] = "cofinet"
@@ -99,7 +99,7 @@ class CofinetNetwork(Pretrained):
 
     @classmethod
     def seeded(cls, config: CofinetConfig, seed: int) -> CofinetNetwork:
-        """A network of random weights; the seed turns the kernel points."""
+        """A network with random weights; the seed rotates the kernel points."""
         return cls(config, seed)
 
     def forward(self, batch: Batch) -> CofinetOutput:
@@ -111,7 +111,7 @@ class CofinetNetwork(Pretrained):
         )
 
     def training_output(self, batch: Batch) -> CofinetEncoding:
-        """`encode` alone: no match takes part in the losses."""
+        """`encode` alone: matches are not needed for the losses."""
         return self.encode(batch)
 
     def encode(self, batch: Batch) -> CofinetEncoding:
@@ -180,9 +180,9 @@ class CofinetNetwork(Pretrained):
     def fine_input(
         self, encoding: CofinetEncoding, patches: tuple[PatchIndex, PatchIndex]
     ) -> tuple[Clouds, Masks]:
-        """Features (B, P, fine_dim) of the patches' points, and which of them the attention may look at.
+        """Features (B, P, fine_dim) of the patches' points, and which of them the attention may attend to.
 
-        Empty places hold point 0 (`CofinetConfig.padding`).
+        Empty slots hold point 0 (`CofinetConfig.padding`).
         """
         source = F.embedding(patches[0].filled, encoding.source.point_features)
         target = F.embedding(patches[1].filled, encoding.target.point_features)
@@ -191,13 +191,13 @@ class CofinetNetwork(Pretrained):
         return (source, target), (patches[0].visible, patches[1].visible)
 
     def losses(self, output: CofinetOutput | CofinetEncoding, targets: CofinetTargets) -> CofinetLosses:
-        """Both losses of a pair, and how good the answers are."""
+        """Both losses of a pair, and the quality of its matches."""
         encoding = output.encoding if isinstance(output, CofinetOutput) else output
         fine = self.assign_points(encoding, targets.patches)
         return cofinet_losses(encoding.log_assignment, fine, targets, self.config.loss)
 
     def memory(self, batch: Batch) -> int:
-        """Predicted peak of a forward pass in bytes, beside what the process and the batch hold already."""
+        """Predicted peak of a forward pass in bytes, on top of what the process and the batch already hold."""
         n, m = batch.pyramid.lengths[-1]
         config, largest = self.config, max(n, m)
         coarse = max(n * m * 8, largest**2 * (config.heads + 2)) * _FLOAT + largest * config.dim * 8 * _FLOAT
@@ -207,7 +207,7 @@ class CofinetNetwork(Pretrained):
         return encoder_bytes(batch.pyramid, config.backbone, max(coarse, fine))
 
     def untrained(self) -> frozenset[str]:
-        """All parts where no training step has touched the network: it has no normalisation weights to tell."""
+        """All parts where no training step has touched the network: it has no normalisation weights to show it."""
         bias = next(bias for name, bias in self.coarse.named_parameters() if name.endswith("squeeze.bias"))
         made = bool((bias == 0).all())
         return frozenset(name for name, _ in self.named_children()) if made else frozenset()

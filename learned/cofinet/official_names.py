@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""How our tensors are called in CoFiNet's published checkpoints."""
+"""Names of our tensors in CoFiNet's published checkpoints."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import re
 
 from hybridreg.learned.kpfcnn.kpfcnn_names import attention_name, block_name
 
-# In every checkpoint, and read by no computation.
+# In every checkpoint, but never used.
 UNUSED = ("l_bin_score", "encoder.epsilon")
 _BLOCKS = ("sattn1", "cattn", "sattn2")
 

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""The transport between the points of two patches: rows and columns are normalised in turn, the slack stays free."""
+"""The transport between the points of two patches: rows and columns are normalised alternately, the slack stays
+free."""
 
 from __future__ import annotations
 
@@ -7,14 +8,14 @@ import torch
 from torch import Tensor
 from torch.nn import functional as F
 
-MASKED = -1e6  # score of a place that no point fills
+MASKED = -1e6  # score of an empty slot
 
 
 def alternating_sinkhorn(scores: Tensor, iterations: int) -> Tensor:
     """Scores (B, n, m) to log-assignments (B, n + 1, m + 1), the last row and column the slack (Yew and Lee 2020).
 
-    The slack's scores are 0, not learned. Each iteration normalises every row but the slack's, the slack's place in it
-    included, then every column but the slack's: a point may be left over, but the slack has no mass to give away.
+    The slack's scores are 0, not learned. Each iteration normalises every row except the slack's, including its slack
+    entry, then every column except the slack's: a point may stay unmatched, but the slack has no mass to distribute.
     """
     padded = F.pad(scores, (0, 1, 0, 1))
     for _ in range(iterations):

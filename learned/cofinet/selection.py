@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Which pairs of superpoints go on to the matching of points."""
+"""Which superpoint pairs are kept for point matching."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from hybridreg.learned.cofinet.config import SelectionConfig
 
 
 class NodePairs(NamedTuple):
-    """Pairs of superpoints, the source's rising; one superpoint may stand in several."""
+    """Superpoint pairs, ordered by source; one superpoint may occur in several."""
 
     source: Tensor  # (K,) int64
     target: Tensor  # (K,) int64
@@ -20,7 +20,7 @@ class NodePairs(NamedTuple):
 
 
 class Tried(NamedTuple):
-    """A threshold that was tried, and how many pairs lie above it."""
+    """A threshold that was tried, and the number of pairs above it."""
 
     threshold: float
     pairs: int
@@ -37,7 +37,7 @@ def select(probability: Tensor, config: SelectionConfig) -> tuple[NodePairs, lis
     tried: list[Tried] = []
     enough = min(config.min_pairs, probability.numel())
     while not tried or tried[-1].pairs < enough:
-        # by multiplication, so that the hundredth step is off by no more than the first
+        # by multiplication, so that rounding errors do not accumulate
         threshold = round(config.threshold - len(tried) * config.step, 9)
         tried.append(Tried(threshold, int((probability > threshold).sum())))
         if threshold < 0.0:

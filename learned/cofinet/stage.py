@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from hybridreg.learned.cofinet.network import CofinetCloud, CofinetEncoding, CofinetNetwork
     from hybridreg.learned.cofinet.selection import NodePairs
 
-# An overlap that leaves fewer superpoints of a cloud than this is taken to be wrong, and ignored.
+# An overlap mask that leaves fewer superpoints of a cloud than this is considered wrong, and ignored.
 _FEWEST = 4
 
 
@@ -32,9 +32,9 @@ class Cofinet(StackedStage):
     min_overlap : float in [0, 1]
         Superpoints with a lower probability of overlap are left out, unless too few would remain.
     matches : int
-        At most so many are given, drawn by their confidence; 5000 as published.
+        At most this many are returned, drawn by their confidence; 5000 as published.
     seed : int
-        Of the draw.
+        Of the random sampling.
     """
 
     min_overlap: float = 0.5
@@ -101,7 +101,7 @@ class Cofinet(StackedStage):
         from hybridreg.learned.stages.tensor_values import array
 
         kept = gather(probability, level.points, array(cloud.nodes)) > self.min_overlap
-        # A mask that is one everywhere says nothing, and neither does one that leaves nothing.
+        # A mask that is one everywhere has no information, nor has one that leaves nothing.
         if bool((probability == 1.0).all()) or kept.sum() < min(_FEWEST, len(kept)):
             kept = np.ones(len(kept), dtype=bool)
         return torch.from_numpy(kept).to(cloud.nodes.device)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What both transports should have found, from the true pose, and what a step draws: for training only."""
+"""Training targets of both transports from the true pose, and the pairs that a step draws."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from hybridreg.learned.pyramid.point_pyramid import Pyramid
 
 @dataclass(frozen=True, kw_only=True)
 class CofinetTargets:
-    """Weights of both losses. Rows are the source's, columns the target's, the last ones the slack."""
+    """Weights of both losses. Rows are the source's, columns the target's, the last of each the slack."""
 
     coarse: Tensor  # (n + 1, m + 1) of the superpoints
     drawn: Tensor  # (B, 2) int64: pairs of superpoints, source and target
@@ -36,7 +36,7 @@ class CofinetTargets:
 def compute_targets(
     pyramid: Pyramid, transform: Tensor, config: CofinetConfig, generator: torch.Generator
 ) -> CofinetTargets:
-    """Targets of a pair, and one draw of true pairs of superpoints, with replacement; none where there are none.
+    """Targets of a pair, and one sample of true superpoint pairs, with replacement; empty where there are none.
 
     Parameters
     ----------
@@ -87,16 +87,16 @@ def with_pairs(
 def node_weights(
     pairs: tuple[Tensor, Tensor], owners: tuple[Tensor, Tensor], counts: tuple[int, int], min_overlap: float
 ) -> Tensor:
-    """(n + 1, m + 1): how much of the points of two superpoints is the same place, and what of each has no partner.
+    """(n + 1, m + 1): how much of two superpoints' points coincides, and the share of each without correspondence.
 
-    The weight of a pair is the lesser of two products, one a side: the share of the superpoint's point pairs that go to
-    the other one, times the share of its points that have any partner. Point pairs are counted, so dense places count
-    more than once. Weights up to ``min_overlap`` become 0; the slack stays as it was.
+    The weight of a pair is the smaller of two products, one a side: the share of the superpoint's point pairs that go
+    to the other one, times the share of its points with any correspondence. Point pairs are counted, so dense places
+    count more than once. Weights up to ``min_overlap`` become 0; the slack is left unchanged.
 
     Parameters
     ----------
     pairs
-        (P,), (P,) rows of source and target points that are the same place.
+        (P,), (P,) rows of source and target points that coincide.
     owners
         (N,), (M,) superpoint of each point.
     counts
@@ -133,9 +133,9 @@ def fine_truth(
     *,
     released: bool,
 ) -> Tensor:
-    """(B, P + 1, P + 1): 1 for points nearer than the radius (m), and in the slack for points without a partner.
+    """(B, P + 1, P + 1): 1 for points nearer than the radius (m), and in the slack for points without a correspondence.
 
-    As ``released``, point 0 in the empty places counts as a partner: a point near nothing else has no label then.
+    As ``released``, point 0 in the empty slots counts as a correspondence: a point near nothing else then has no label.
     """
     source, target = points[0][patches[0].filled], points[1][patches[1].filled]
     near = torch.cdist(source, target, compute_mode="donot_use_mm_for_euclid_dist") < radius

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Self, cross, self attention and a projection: of the superpoints, and once more of each pair of patches."""
+"""Self-, cross- and self-attention and a projection: for the superpoints, and again for each pair of patches."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from hybridreg.learned.layers.message_attention import Clouds, Masks, MessageBlo
 
 
 class PairTransformer(nn.Module):
-    """Three blocks with residuals and no positions, then one linear layer for both sides."""
+    """Three blocks with residuals and without positions, then one linear layer for both sides."""
 
     def __init__(self, dim: int, heads: int) -> None:
         super().__init__()
@@ -19,7 +19,7 @@ class PairTransformer(nn.Module):
         self.project = nn.Linear(dim, dim)
 
     def forward(self, clouds: Clouds, masks: Masks = (None, None)) -> Clouds:
-        """Features (..., n, d), (..., m, d) of source and target, of which ``masks`` may leave rows out."""
+        """Features (..., n, d), (..., m, d) of source and target, of which ``masks`` may exclude rows."""
         return list(self.steps(clouds, masks))[-1]
 
     def steps(self, clouds: Clouds, masks: Masks = (None, None)) -> Iterator[Clouds]:

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: MIT
-"""Cross3DReg and GeoTransformer in one network, whose parts a configuration switches on."""
+"""Cross3DReg and GeoTransformer in one network; the configuration switches its parts on."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What a network takes: the pyramid of a pair, input features, and the image where there is one. No truth."""
+"""The input of a network: the pyramid of a pair, input features, and the image where there is one. No ground truth."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from hybridreg.learned.pyramid.point_pyramid import Pyramid, PyramidPlan, build_
 
 
 class BackbonePlan(PyramidPlan, Protocol):
-    """What a backbone's configuration tells of a batch."""
+    """What a batch needs of a backbone's configuration."""
 
     @property
     def max_range(self) -> float | None:
@@ -26,11 +26,11 @@ class BackbonePlan(PyramidPlan, Protocol):
 
     @property
     def input_features(self) -> Literal["ones", "geometric"]:
-        """What the points bring along."""
+        """The kind of input features."""
 
 
 class BatchPlan(Protocol):
-    """What a network's configuration tells of a batch."""
+    """What a batch needs of a network's configuration."""
 
     @property
     def backbone(self) -> BackbonePlan:
@@ -38,7 +38,7 @@ class BatchPlan(Protocol):
 
     @property
     def image(self) -> ImageConfig | None:
-        """Of the image; None where the network looks at none."""
+        """Of the image; None where the network uses none."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -73,11 +73,11 @@ def make_batch(
     config
         Of the network that will take the batch.
     image
-        (H, W, 3) uint8, or None; left aside by a network that has no image encoder.
+        (H, W, 3) uint8, or None; ignored by a network without image encoder.
     subsample
         False when both clouds already are on the first stage's grid.
     device
-        Where the neighbours are searched and the tensors end up.
+        Where the neighbours are searched and the tensors are placed.
     """
     reach = config.backbone.max_range
     near = [cloud if reach is None else _within(cloud, reach) for cloud in (target, source)]
@@ -92,6 +92,6 @@ def make_batch(
 
 
 def _within(points: npt.NDArray[np.floating], reach: float) -> npt.NDArray[np.floating]:
-    # From the median, not from the origin: a cloud in map coordinates loses nothing of its middle.
+    # From the median, not from the origin: a cloud in map coordinates keeps its middle.
     away = points[:, :2] - np.median(points[:, :2], axis=0)
     return points[np.hypot(away[:, 0], away[:, 1]) <= reach]

@@ -13,8 +13,11 @@ from hybridreg.config.plain_values import build
 
 DEFAULT_NEIGHBOR_LIMITS = (65, 80, 60, 60, 65)
 
-# A configuration may come with a stranger's weights: what no network has is refused before memory is asked for it.
-_WIDEST, _MOST_KERNEL_POINTS, _MOST_BLOCKS, _MOST_NEIGHBORS = 8192, 256, 64, 10_000
+# A configuration may come with untrusted weights: absurd sizes are refused before memory is allocated. By hand.
+_WIDEST = 8192  # channels
+_MOST_KERNEL_POINTS = 256
+_MOST_BLOCKS = 64
+_MOST_NEIGHBORS = 10_000  # of a point
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -25,16 +28,16 @@ class BackboneConfig:
     voxel: float = 0.25
     max_range: float | None = None  # metres from the cloud's median; farther points are left out
     base_radius: float = 4.25  # search radius in voxels of the stage
-    base_sigma: float = 2.0  # reach of a kernel point in voxels of the stage
+    base_sigma: float = 2.0  # influence radius of a kernel point in voxels of the stage
     neighbor_limits: tuple[int, ...] = DEFAULT_NEIGHBOR_LIMITS
     init_dim: int = 64
     groups: int = 32
     fine_dim: int = 256
     fine_stage: int = 2  # counted from 1: the stage whose points are matched
     kernel_points: int = 15
-    shared_kernel_points: bool = False  # one kernel disposition a stage: influences are computed once
-    # Where a neighbour lies: in three dimensions as published, or by its distance from the vertical axis through
-    # the query and its height, which no turn about the vertical changes.
+    shared_kernel_points: bool = False  # one set of kernel points a stage: influences are computed once
+    # Coordinates of a neighbour: three as published, or its distance from the vertical axis through the query and its
+    # height, which are invariant to yaw.
     kernel: Literal["spatial", "cylindrical"] = "spatial"
     input_features: Literal["ones", "geometric"] = "ones"
     norm_scope: Literal["stacked", "per_cloud"] = "stacked"
@@ -74,13 +77,13 @@ class BackboneConfig:
         return self.voxel * self.base_radius * 2**stage
 
     def sigma(self, stage: int) -> float:
-        """Reach (m) of a kernel point at a stage counted from 0."""
+        """Influence radius (m) of a kernel point at a stage counted from 0."""
         return self.voxel * self.base_sigma * 2**stage
 
 
 @dataclass(frozen=True, kw_only=True)
 class ImageConfig:
-    """Residual U-Net on the photograph (docs/methods.md 4)."""
+    """Residual U-Net on the camera image (docs/methods.md 4)."""
 
     height: int = 288
     width: int = 512
@@ -107,12 +110,12 @@ class OmpConfig:
     position: Literal["none", "sine"] = "none"
     pool: int = 4
     cross_cloud: bool = False
-    evidence: bool = False  # superpoints also know how alike and unique their points' partners are; ours
+    evidence: bool = (
+        False  # also give superpoints the similarity and uniqueness of their points' matches; ours
+    )
     min_kept: int = 32
     min_kept_share: float = 0.15
-    doubted: float = (
-        0.0  # share of the point matches left out: those whose ends it believes least; ours, at inference
-    )
+    doubted: float = 0.0  # share of point matches left out, those least likely to overlap; ours, at inference
 
     def __post_init__(self) -> None:
         limits.within(self, 1, _WIDEST, "dim", "heads", "pool")
@@ -168,9 +171,9 @@ class TransformerConfig:
 class MatchingConfig:
     """Superpoint and point matching (docs/methods.md 7, 8).
 
-    The last three are ours, at inference only, and off by default, as published: fine points vote for pairs of
-    superpoints, a match's weight is the geometric mean of its assignment and of how unique it is, and matches below
-    ``uniqueness`` and those that do not move with the others are left out.
+    The last three are ours, at inference only, and off by default, as published: fine points vote for superpoint
+    pairs, a match's weight is the geometric mean of its assignment and its uniqueness, and matches below
+    ``uniqueness`` and those inconsistent with the others are left out.
     """
 
     superpoint_matches: int = 256
@@ -209,12 +212,12 @@ class LgrConfig:
     acceptance_radius: float = 0.5  # metres
     min_group: int = 3
     steps: int = 5
-    max_votes: int | None = None  # vote with at most so many best correspondences
+    max_votes: int | None = None  # vote with at most this many best correspondences
 
 
 @dataclass(frozen=True, kw_only=True)
 class LossConfig:
-    """Targets and losses (docs/methods.md 7.4, 10)."""
+    """Targets and losses (docs/methods.md 5.3, 7.4, 10)."""
 
     targets: int = 128
     positive_overlap: float = 0.1
@@ -246,7 +249,7 @@ class NetworkConfig:
 
     def __post_init__(self) -> None:
         if (self.omp or self.vgam) and self.image is None:
-            raise ValueError("omp and vgam look at image tokens: give an ImageConfig")
+            raise ValueError("omp and vgam use image tokens: give an ImageConfig")
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values that `from_dict` and JSON take back."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What a network knows about a pair at the ends of its parts."""
+"""Intermediate results of the network for a pair."""
 
 from __future__ import annotations
 
@@ -29,16 +29,16 @@ class CloudEncoding:
 
 @dataclass(frozen=True, kw_only=True)
 class Encoding:
-    """A pair after the encoders: what all later parts share."""
+    """A pair after the encoders, shared by all later parts."""
 
     target: CloudEncoding
     source: CloudEncoding
     image: ImageFeatures | None
-    evidence: tuple[Tensor, Tensor] | None = None  # of target and source, where OMP wants it
+    evidence: tuple[Tensor, Tensor] | None = None  # of target and source, where OMP uses it
 
 
 class Known(NamedTuple):
-    """What no turn about the vertical and no shift changes: output of the backbone, and evidence for the overlap."""
+    """Results that are invariant to yaw and shifts: output of the backbone, and evidence for the overlap."""
 
     coarse: Tensor  # (n, C), both clouds
     fine: Tensor  # (N, d)

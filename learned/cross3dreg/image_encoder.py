@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The image encoder: a residual U-Net whose output the attention looks at, or one null token (docs/methods.md 4)."""
+"""The image encoder: a residual U-Net whose output gives the image tokens, or one null token (docs/methods.md 4)."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from hybridreg.learned.cross3dreg.config import ImageConfig
 
 @dataclass(frozen=True)
 class ImageFeatures:
-    """The image as the network sees it; without one, ``grid`` is None and ``null`` stands for all tokens."""
+    """Image features; without an image ``grid`` is None and ``null`` replaces all tokens."""
 
     grid: Tensor | None  # (d, h, w)
     null: Tensor  # (1, d)
@@ -84,7 +84,7 @@ def _joined(block: nn.Module, features: Tensor, skip: Tensor) -> Tensor:
 
 
 def _last_level(config: ImageConfig) -> int:
-    # Level l of the encoder has stride 2 ** (l + 1); stride 1 is one block more, on the image itself.
+    # Level l of the encoder has stride 2 ** (l + 1); stride 1 adds one block on the image itself.
     level = max(config.output_stride.bit_length() - 2, 0)
     if level > len(config.widths) - 2:
         raise ValueError(f"output_stride {config.output_stride} is not finer than the encoder's last stage")

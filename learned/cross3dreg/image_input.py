@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""From a photograph to the tensor that the image encoder takes."""
+"""From a camera image to the tensor that the image encoder takes."""
 
 from __future__ import annotations
 
@@ -41,6 +41,6 @@ def image_tensor(image: npt.NDArray[np.uint8], height: int, width: int) -> Tenso
 
 
 def letterboxed_size(rows: int, columns: int, height: int, width: int) -> tuple[int, int]:
-    """Rows and columns of an image of ``rows`` x ``columns`` pixels once it fits into ``height`` x ``width``."""
+    """Rows and columns of an image of ``rows`` x ``columns`` pixels scaled to fit into ``height`` x ``width``."""
     scale = min(height / rows, width / columns)
     return max(1, round(rows * scale)), max(1, round(columns * scale))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The three losses together (docs/methods.md 10.3)."""
+"""Total loss: coarse, fine and mask loss together (docs/methods.md 10.3)."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class Losses:
 
     @property
     def total(self) -> Tensor:
-        """Plain sum."""
+        """Their plain sum."""
         return self.coarse + self.fine + self.mask
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The whole network: GeoTransformer, and with OMP and VGAM switched on, Cross3DReg."""
+"""The whole network: GeoTransformer, or with OMP and VGAM switched on, Cross3DReg."""
 
 from __future__ import annotations
 
@@ -40,14 +40,14 @@ from hybridreg.learned.weights import load_official_tensors
 
 
 class RegistrationNetwork(Pretrained):
-    """Features, overlap, superpoint and point matches of a pair. No part of it takes a ground truth.
+    """Features, overlap, superpoint and point matches of a pair. No part of it takes the ground truth.
 
     Parameters
     ----------
     config
         The network; ``named_config`` has the published ones.
     seed
-        Fixes how the kernel points of unshared layers are turned. The weights follow torch's generator.
+        Fixes the rotation of the kernel points of unshared layers. The weights follow torch's generator.
     """
 
     name: ClassVar[str] = "cross3dreg"
@@ -75,7 +75,7 @@ class RegistrationNetwork(Pretrained):
 
     @classmethod
     def seeded(cls, config: NetworkConfig, seed: int) -> RegistrationNetwork:
-        """A network of random weights; the seed turns the kernel points."""
+        """A network with random weights; the seed rotates the kernel points."""
         return cls(config, seed)
 
     def configured(self, config: NetworkConfig) -> RegistrationNetwork:
@@ -101,7 +101,7 @@ class RegistrationNetwork(Pretrained):
         )
 
     def encode(self, batch: Batch, known: Known | None = None) -> Encoding:
-        """Run the encoders and group fine points into patches; ``known`` spares the backbone where its output for this
+        """Run the encoders and group fine points into patches; ``known`` skips the backbone where its output for this
         batch is known."""
         pyramid = batch.pyramid
         coarse, fine, evidence = known or Known(*self.backbone(batch.features, pyramid))
@@ -146,7 +146,7 @@ class RegistrationNetwork(Pretrained):
         return self.omp(*features, encoding.image)
 
     def keep(self, encoding: Encoding, overlap: OverlapLogits | None) -> tuple[Kept, Kept]:
-        """Choose the superpoints of both clouds that go on. An uninformed mask keeps everything."""
+        """Choose the superpoints of both clouds that are kept. An uninformed mask keeps everything."""
         target = self._keep(
             encoding.target, None if overlap is None or not overlap.informed else overlap.target
         )
@@ -202,7 +202,7 @@ class RegistrationNetwork(Pretrained):
         return superpoints, matches
 
     def compare_points(self, encoding: Encoding, kept: tuple[Kept, Kept]) -> PointSimilarity | None:
-        """The fine points of the kept superpoints held against each other; None where that is not wanted."""
+        """Similarities of the fine points of the kept superpoints; None where they are not needed."""
         temperature = self.config.matching.vote_temperature
         if temperature is None:
             return None
@@ -276,7 +276,7 @@ class RegistrationNetwork(Pretrained):
         return matches
 
     def memory(self, batch: Batch) -> int:
-        """Predicted peak of a forward pass in bytes, beside what the process and the batch hold already."""
+        """Predicted peak of a forward pass in bytes, on top of what the process and the batch already hold."""
         return forward_bytes(batch.pyramid, self.config)
 
     @classmethod

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The overlapping mask predictor: which superpoints does the other cloud share (docs/methods.md 5.1)."""
+"""The overlapping mask predictor (OMP): which superpoints lie in the overlap (docs/methods.md 5.1)."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class OverlapLogits:
 
     target: Tensor  # (m,)
     source: Tensor  # (n,)
-    informed: bool  # false: neither an image nor the other cloud was looked at
+    informed: bool  # false: neither an image nor the other cloud was available
 
 
 class OverlapPredictor(nn.Module):

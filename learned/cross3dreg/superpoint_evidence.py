@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""What speaks for a superpoint being seen by the other cloud too, besides its own feature.
+"""Evidence besides its own feature that a superpoint lies in the overlap.
 
-Not in the published network, whose mask predictor sees features and image alone. Features of the backbone tell what a
-place looks like; whether the other cloud has such a place, they do not.
+Not in the published network, whose mask predictor sees only features and image. Features of the backbone describe what
+a place looks like, not whether the other cloud contains such a place.
 """
 
 from __future__ import annotations
@@ -23,8 +23,8 @@ def superpoint_evidence(
     owners: tuple[Tensor, Tensor],
     temperature: float,
 ) -> tuple[Tensor, Tensor]:
-    """(m, 5), (n, 5) of order one: mean and largest likeness of a superpoint's points with their likest partners, the
-    same of their uniqueness, and how many points it has. No motion of a cloud changes them.
+    """(m, 5), (n, 5) of order one: mean and largest similarity of a superpoint's points to their best matches, the
+    same for their uniqueness, and the number of its points. Invariant to motions of the clouds.
 
     Parameters
     ----------
@@ -43,14 +43,14 @@ def superpoint_evidence(
 
 
 class Partners(NamedTuple):
-    """Of each point of a cloud (n,): cosine with its likest partner, and the logarithm of that one's softmax."""
+    """For each point of a cloud (n,): cosine with its most similar point, and the logarithm of its softmax."""
 
     best: Tensor
     sure: Tensor
 
 
 def partners(f: Tensor, g: Tensor, temperature: float) -> tuple[Partners, Partners]:
-    """The likest partners of unit features (M, d), (N, d) among each other, from every pair in one pass."""
+    """The most similar points of unit features (M, d), (N, d), from all pairs in one pass."""
     best_f, total_f = [], []
     best_g, total_g = g.new_full((len(g),), -1.0), g.new_zeros(len(g))
     for block in f.split(_BLOCK):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Which superpoints go on to the matching: the predicted mask, its fallbacks, and the cap (docs/methods.md 5.5)."""
+"""Which superpoints are kept for matching: the predicted mask, its fallbacks, and the limit (docs/methods.md 5.5)."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ _MIN_NODES = 4
 
 @dataclass(frozen=True)
 class Kept:
-    """Superpoints of one cloud that stay, ascending, which rung of the ladder chose them, and the probability of
-    overlap that all superpoints have, where it is known."""
+    """Kept superpoints of one cloud, ascending, the fallback that chose them, and the overlap probability of all
+    superpoints, where it is known."""
 
     index: Tensor  # (k,) int64
     fallback: Fallback = "none"
@@ -29,7 +29,7 @@ class Kept:
 
 
 def keep_predicted(probability: Tensor, patches: Patches, config: OmpConfig) -> Kept:
-    """Superpoints above the threshold; too few: the most probable; still too few: all that own points."""
+    """Superpoints above the threshold; if too few, the most probable; if still too few, all with fine points."""
     n = len(probability)
     fallback: Fallback = "none"
     keep = probability > config.threshold
@@ -50,7 +50,7 @@ def keep_all(patches: Patches) -> Kept:
 
 
 def choose(patches: Patches, probability: Tensor | None, config: OmpConfig, limit: int) -> Kept:
-    """Superpoints of one cloud that go on: by their probability (n,) of overlap, or all where none is known."""
+    """Superpoints of one cloud that are kept: by their overlap probability (n,), or all where it is not known."""
     if probability is None:
         sizes = torch.bincount(patches.owner, minlength=len(patches.mask))
         return cap(keep_all(patches), sizes, limit)

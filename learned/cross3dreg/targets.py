@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What a network should have found, from the true pose: for training only (docs/methods.md 5.2, 7.2)."""
+"""Training targets from the true pose: patch overlaps and the true mask (docs/methods.md 5.2, 7.2)."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class Targets:
     target: Tensor  # (G,) int64 superpoints
     source: Tensor  # (G,) int64
     overlap: Tensor  # (G,) in (0, 1]
-    mask_target: Tensor  # (m,) bool: superpoints in the common region
+    mask_target: Tensor  # (m,) bool: superpoints in the overlap
     mask_source: Tensor  # (n,) bool
 
 
@@ -93,7 +93,7 @@ def _candidates(
     patches: tuple[Patches, Patches],
     radius: float,
 ) -> tuple[Tensor, Tensor]:
-    # Two patches can only overlap where the balls around them do.
+    # Two patches can only overlap where their bounding balls do.
     reach = [_reach(nodes[side], points[side], patches[side]) for side in (0, 1)]
     distance = squared_distances(nodes[0], nodes[1]).sqrt()
     near = reach[0][:, None] + reach[1][None] + radius > distance

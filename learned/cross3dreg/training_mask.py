@@ -13,7 +13,7 @@ from hybridreg.learned.cross3dreg.superpoint_mask import Kept, cap
 
 @dataclass(frozen=True, kw_only=True)
 class MaskJitter:
-    """How far the true mask is disturbed, so that the matcher learns to live with a predicted one."""
+    """How the true mask is perturbed, so that the matcher learns to work with a predicted one."""
 
     drop_positive: float = 0.1  # share of the true superpoints left out
     keep_negative: float = 0.3  # share of the others kept

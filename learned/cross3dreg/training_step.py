@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""One training step's forward pass: the only place where the truth meets a network (docs/methods.md 5.4, 7.4)."""
+"""One training step's forward pass: the only place where a network meets the ground truth (docs/methods.md 5.4,
+7.4)."""
 
 from __future__ import annotations
 
@@ -36,7 +37,7 @@ def training_losses(
     generator
         Draws the kept superpoints and the patch pairs.
     jitter
-        Of the true mask; only looked at when the network has OMP.
+        Of the true mask; only used when the network has OMP.
     """
     encoding = network.encode(batch)
     overlap = network.predict_overlap(encoding)
@@ -57,7 +58,7 @@ def fine_loss(
     config = network.config.loss
     chosen = sample_target_pairs(targets, config.positive_overlap, config.targets, generator)
     target, source = targets.target[chosen], targets.source[chosen]
-    # The noise of the augmentation may have taken the only point of a patch to the next one.
+    # The noise of the augmentation may have moved the only point of a patch into another one.
     owning = encoding.target.patches.occupied[target] & encoding.source.patches.occupied[source]
     pairs = network.pair_up(encoding, target[owning], source[owning])
     assignment = network.assign(encoding, pairs, "log", config.training_sinkhorn_iterations)
@@ -68,7 +69,7 @@ def fine_loss(
 def sample_target_pairs(targets: Targets, min_overlap: float, limit: int, rng: torch.Generator) -> Tensor:
     """Indices (B,) of at most ``limit`` random true superpoint pairs that overlap by over ``min_overlap``.
 
-    Predicted pairs would teach the point matcher that mostly there is nothing to match.
+    Predicted pairs would teach the point matcher that most points have no correspondence.
     """
     good = (targets.overlap > min_overlap).nonzero()[:, 0]
     order = torch.randperm(len(good), generator=rng)[:limit]
@@ -83,7 +84,7 @@ def keep_for_training(
     jitter: MaskJitter,
     generator: torch.Generator,
 ) -> tuple[Kept, Kept]:
-    """Superpoints of both clouds that a step works on: the true mask, disturbed; all of them without OMP."""
+    """Superpoints of both clouds that a step keeps: the true mask with jitter; all of them without OMP."""
     if overlap is None:
         return network.keep(encoding, None)
     limit = network.config.matching.max_superpoints

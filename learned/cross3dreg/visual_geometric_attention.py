@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Visual-geometric attention: superpoints look at the image, then at their own cloud (docs/methods.md 6.1 to 6.5)."""
+"""Visual-geometric attention (VGAM): superpoints attend to the image, then to their own cloud (docs/methods.md 6.1 to
+6.5)."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What FCGF takes: the voxels of both clouds, of one pair or of several. No truth."""
+"""The input of FCGF: the voxels of both clouds, of one pair or of several. No ground truth."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from hybridreg.learned.layers.voxels import VoxelPyramid, quantise
 
 @dataclass(frozen=True, kw_only=True)
 class VoxelClouds:
-    """One side of a batch; the clouds of several pairs stand one after another."""
+    """One side of a batch; the clouds of several pairs are concatenated."""
 
     points: Tensor  # (N, 3) metres: the point that represents each voxel, in the input's order
     coords: Tensor  # (N, 4) int64: cloud, x, y, z
@@ -95,7 +95,7 @@ def _voxels(
 
 
 def collate(batches: Sequence[FcgfBatch]) -> FcgfBatch:
-    """Several pairs as one batch: batch statistics and negatives are then taken over all of them, as published."""
+    """Several pairs as one batch: batch statistics and negatives are then over all of them, as published."""
     return FcgfBatch(
         source=_joined([batch.source for batch in batches]),
         target=_joined([batch.target for batch in batches]),

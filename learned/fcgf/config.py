@@ -11,8 +11,10 @@ from typing import Any, Literal
 from hybridreg.config import limits
 from hybridreg.config.plain_values import build
 
-# What no network has is refused before memory is asked for it.
-_WIDEST, _WIDEST_KERNEL, _MOST_LEVELS = 8192, 9, 8
+# A configuration may come with untrusted weights: absurd sizes are refused before memory is allocated. By hand.
+_WIDEST = 8192  # channels
+_WIDEST_KERNEL = 9  # voxels
+_MOST_LEVELS = 8
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -41,7 +43,8 @@ class FcgfLossConfig:
 
 @dataclass(frozen=True, kw_only=True)
 class FcgfConfig:
-    """ResUNetBN2C and its likes (model/resunet.py): a residual U-Net of sparse convolutions. The defaults are KITTI's.
+    """ResUNetBN2C and its variants (model/resunet.py): a residual U-Net of sparse convolutions. The defaults are
+    KITTI's.
 
     ``channels`` are the encoder's from fine to coarse. ``tr_channels`` are the decoder's in the same order: the first
     of the 1x1x1 convolution before the last, the last of the transposed convolution from the coarsest level.
@@ -73,7 +76,7 @@ class FcgfConfig:
             raise ValueError(f"{len(self.channels)} channels: give 2 to {_MOST_LEVELS}, one a level")
         if len(self.channels) != len(self.tr_channels):
             raise ValueError(
-                f"{len(self.tr_channels)} tr_channels for {len(self.channels)} channels: give as many of either"
+                f"{len(self.tr_channels)} tr_channels for {len(self.channels)} channels: give the same number of both"
             )
 
     @property

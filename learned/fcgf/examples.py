@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What a training step of FCGF looks at."""
+"""Training examples of FCGF."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from hybridreg.learned.true_pair import TruePair, torch_generator
 
 
 def example(pair: TruePair, config: FcgfConfig, rng: np.random.Generator) -> tuple[FcgfBatch, FcgfTargets]:
-    """Voxels of a pair, with the published noise on their features, and one draw of anchors and candidates.
+    """Voxels of a pair, with the published noise on their features, and one sample of anchors and candidates.
 
     Raises
     ------
@@ -30,7 +30,7 @@ def example(pair: TruePair, config: FcgfConfig, rng: np.random.Generator) -> tup
 
 
 def collate(examples: Sequence[tuple[FcgfBatch, FcgfTargets]]) -> tuple[FcgfBatch, FcgfTargets]:
-    """Several pairs as one step, as published: statistics and candidates for negatives are then those of all of them.
+    """Several pairs as one step, as published: statistics and candidates for negatives are then over all of them.
 
     Anchors and candidates stay those that were drawn pair by pair; the published code draws from the whole batch.
     """

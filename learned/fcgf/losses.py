@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The hardest-contrastive loss (Choy et al. 2019, equation 4), as released and as printed."""
+"""The hardest-contrastive loss (Choy et al. 2019, equation 4), as released and as printed (docs/methods.md 11.1)."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class Mined:
 
 @dataclass(frozen=True, kw_only=True)
 class HardestContrastive:
-    """Both terms before they are weighed, and what was mined."""
+    """Both terms before weighting, and what was mined."""
 
     positive: Tensor
     negative: Tensor  # mean of the two sides
@@ -34,10 +34,10 @@ class HardestContrastive:
 def hardest_contrastive(
     source: Tensor, target: Tensor, targets: FcgfTargets, config: FcgfLossConfig
 ) -> HardestContrastive:
-    """Pull the drawn positives together, push each of their ends from its nearest candidate on the other side.
+    """Pull the drawn positives together, push each of their points from its nearest candidate on the other side.
 
     A candidate counts unless it and the anchor are literally in the list of positives: one just outside the search
-    radius is a legal negative, and so is one of another pair of the batch (lib/trainer.py 404-453).
+    radius is a valid negative, and so is one of another pair of the batch (lib/trainer.py 404-453).
 
     Parameters
     ----------
@@ -71,7 +71,7 @@ def hardest_contrastive(
 
 def _mine(anchor: Tensor, side: Tensor, candidates: Tensor, config: FcgfLossConfig) -> Mined:
     among = side[candidates]
-    # Differences, not a product of matrices: features may have any length, and equal ones must come out at 0.
+    # Differences, not a matrix product: features may have any length, and equal ones must give exactly 0.
     apart = torch.cdist(anchor.detach(), among.detach(), compute_mode="donot_use_mm_for_euclid_dist")
     best = apart.argmin(1)
     distance = ((anchor - among[best]).square().sum(1) + config.distance_eps).sqrt()

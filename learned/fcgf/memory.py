@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""How much memory a forward pass of FCGF will take, told before it runs."""
+"""Memory estimate of a forward pass of FCGF, before it runs."""
 
 from __future__ import annotations
 
@@ -11,8 +11,9 @@ from hybridreg.learned.layers.sparse_conv import FEW_CHANNELS
 from hybridreg.learned.layers.voxels import VoxelPyramid
 from hybridreg.learned.memory_estimate import SLACK
 
-_FLOAT, _INDEX = 4, 8
-_PER_PAIR = 2 * _INDEX  # a list of pairs keeps its inputs and its outputs
+_FLOAT = 4  # bytes
+_INDEX = 8  # bytes
+_PER_PAIR = 2 * _INDEX  # a list of pairs stores its inputs and its outputs
 _COPIES = 3  # of a layer's output alive at a time: normalised, rectified, and what a block adds to it
 
 
@@ -26,12 +27,12 @@ class _Layer(NamedTuple):
 
     @property
     def at_once(self) -> bool:
-        # The inputs of all offsets are laid side by side; other layers hold one product a pair.
+        # The inputs of all offsets are concatenated; other layers hold one product a pair.
         return self.dim_in <= FEW_CHANNELS and not self.back
 
 
 def forward_bytes(pyramids: Sequence[VoxelPyramid], config: FcgfConfig) -> int:
-    """Peak of a forward pass over the pyramids one after another, whose maps all stay. Makes the maps' tables."""
+    """Peak of a forward pass over the pyramids one after another, whose maps are all kept. Builds the maps' tables."""
     kept = sum(_maps(pyramid, config) for pyramid in pyramids)
     return SLACK + kept + max(_working(pyramid, config) for pyramid in pyramids)
 

@@ -28,14 +28,14 @@ from hybridreg.learned.weights import load_official_tensors
 
 @dataclass(frozen=True, kw_only=True)
 class FcgfOutput:
-    """Features of both sides, row by row as the batch's points."""
+    """Features of both sides, in the order of the batch's points."""
 
     source: Tensor  # (N, C)
     target: Tensor  # (M, C)
 
 
 class FcgfNetwork(Pretrained):
-    """Features of a pair, each cloud alone. No part of it takes a ground truth.
+    """Features of a pair, each cloud alone. No part of it takes the ground truth.
 
     In training mode the statistics of batch normalisation are one side's, source first, as in the published training.
     """
@@ -59,7 +59,8 @@ class FcgfNetwork(Pretrained):
             _Level(SparseConv(i, o, kernel), o, config)
             for i, o, kernel in zip(ins, widths, kernels, strict=True)
         )
-        # decoder[i] goes from level i + 1 to level i; but at the coarsest, its input is joined with that level's skip
+        # decoder[i] goes from level i + 1 to level i; except at the coarsest, its input is joined with that level's
+        # skip
         ins = (*[back[i + 2] + widths[i + 1] for i in range(depth - 2)], widths[-1])
         self.decoder = nn.ModuleList(
             _Level(SparseConv(ins[i], back[i + 1], config.tr_kernel, transposed=True), back[i + 1], config)
@@ -106,13 +107,13 @@ class FcgfNetwork(Pretrained):
         return _map(pyramid, self.config.kernel, level, level)
 
     def losses(self, output: FcgfOutput, targets: FcgfTargets) -> LossParts:
-        """Hardest-contrastive loss by part, weighed: their sum is what is trained."""
+        """Hardest-contrastive loss by part, weighted: their sum is trained."""
         found = hardest_contrastive(output.source, output.target, targets, self.config.loss)
         negative = self.config.loss.negative_weight * found.negative
         return LossParts(positive=found.positive, negative=negative)
 
     def memory(self, batch: FcgfBatch) -> int:
-        """Estimated peak of a forward pass in bytes, beside what the process and the batch's points hold already."""
+        """Estimated peak of a forward pass in bytes, on top of what the process and the batch's points already hold."""
         return forward_bytes((batch.source.pyramid, batch.target.pyramid), self.config)
 
     @classmethod
@@ -131,21 +132,21 @@ class FcgfNetwork(Pretrained):
         path
             A ``.pth`` as published (``state_dict`` and ``config``).
         size
-            A configuration or its name, which settles everything. By default widths and kernels are read from the
+            A configuration or its name, which determines everything. By default widths and kernels are read from the
             tensors' shapes, the first kernel from ``conv1.kernel``.
         normalize
-            Was it trained with features of length one? Nothing in the tensors tells, so it must be said where ``size``
-            does not: the table of the repository's README has a column for it.
+            Whether it was trained with features of length one. The tensors do not show it, so it must be given where
+            ``size`` does not: the table of the repository's README has a column for it.
         voxel
-            Edge (m) of the grid it was trained with. None takes what the file says; where it says nothing, 0.025 for a
-            first kernel of 7 (3DMatch at 2.5 cm) and 0.3 (KITTI) for others. Name it for 3DMatch weights of 5 cm.
+            Edge (m) of the grid it was trained with. None takes the file's value; where it has none, 0.025 for a
+            first kernel of 7 (3DMatch at 2.5 cm) and 0.3 (KITTI) for others. Give it for 3DMatch weights of 5 cm.
 
         Raises
         ------
         FileNotFoundError
             No such file.
         ValueError
-            Not a checkpoint of this network: the wrong tensor is named. Or ``normalize`` was not said, or said twice.
+            Not a checkpoint of this network: the wrong tensor is named. Or ``normalize`` was not given, or given twice.
         """
         checkpoint = read_checkpoint(path)
         if size is not None:
@@ -154,7 +155,7 @@ class FcgfNetwork(Pretrained):
             config = named_config(size) if isinstance(size, str) else size
         elif normalize is None:
             raise ValueError(
-                f"the checkpoint {os.fspath(path)!r} does not tell whether its features were normalised in training; "
+                f"the checkpoint {os.fspath(path)!r} does not say whether its features were normalised in training; "
                 "say normalize=True or normalize=False (the table of FCGF's README has it)"
             )
         else:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""How our tensors are called in FCGF's published checkpoints, and what the checkpoints' shapes tell."""
+"""Names of our tensors in FCGF's published checkpoints, and the configuration from a checkpoint's shapes."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ def official_name(name: str) -> str:
     """The checkpoint's name of one tensor of our state dict."""
     name = re.sub(r"^mix\.", "conv1_tr.", name)
     name = re.sub(r"(norm\d?)\.", r"\1.bn.", name)
-    # Levels count from 1; the decoder's are called by the level that they come from.
+    # Levels count from 1; the decoder's are named after the level that they come from.
     name = re.sub(r"^encoder\.(\d+)\.([a-z]+)\.", lambda m: f"{m[2]}{int(m[1]) + 1}.", name)
     return re.sub(
         r"^decoder\.(\d+)\.([a-z]+)\.((?:bn)?)",
@@ -32,13 +32,13 @@ def config_of(
     Raises
     ------
     ValueError
-        A tensor that every such network has is missing, or no cube: it is named.
+        A tensor that every such network has is missing, or not a cube: it is named.
     """
     depth = 0
     while f"conv{depth + 1}.kernel" in tensors:
         depth += 1
     if depth < 2:
-        raise ValueError(f"{origin}: tensor conv{depth + 1}.kernel is missing; these are no weights of FCGF")
+        raise ValueError(f"{origin}: tensor conv{depth + 1}.kernel is missing; these are not weights of FCGF")
 
     def shape(name: str) -> tuple[int, ...]:
         if name not in tensors:
@@ -53,7 +53,9 @@ def config_of(
         volume = 1 if len(shape(name)) == 2 else shape(name)[0]
         size = round(volume ** (1 / 3))
         if size**3 != volume:
-            raise ValueError(f"{origin}: tensor {name} has shape {shape(name)}: {volume} offsets are no cube")
+            raise ValueError(
+                f"{origin}: tensor {name} has shape {shape(name)}: {volume} offsets are not a cube"
+            )
         return size
 
     levels = range(1, depth + 1)

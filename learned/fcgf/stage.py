@@ -21,8 +21,8 @@ if TYPE_CHECKING:
 class Fcgf(NetworkStage):
     """Pair each voxel of the source with the target's voxel of the nearest feature (Choy et al. 2019).
 
-    The network looks at the clouds on its own grid, anchored at each cloud's origin; the points that are matched are
-    the first of each voxel. Weights that saw no rotation in training (KITTI's published ones) match no turned clouds.
+    The network voxelises the clouds on its own grid, anchored at each cloud's origin; the points that are matched are
+    the first of each voxel. Weights trained without rotations (KITTI's published ones) do not match rotated clouds.
 
     Parameters
     ----------
@@ -31,7 +31,7 @@ class Fcgf(NetworkStage):
     mutual : bool
         Keep only pairs that are each other's nearest. Published results come from all of them.
     normalize : bool or None
-        Was a published checkpoint trained with features of length one? The file does not tell, so it must be said.
+        Whether a published checkpoint was trained with features of length one; the file does not say.
     voxel : float or None
         Edge (m) of the grid that a published checkpoint was trained with, see `FcgfNetwork.load_official`.
     """
@@ -76,5 +76,5 @@ class Fcgf(NetworkStage):
         )
 
     def told(self) -> tuple[tuple[str, Any], ...]:
-        """What a published checkpoint cannot tell, as `FcgfNetwork.load_official` takes it."""
+        """What a published checkpoint does not contain, as arguments of `FcgfNetwork.load_official`."""
         return (("normalize", self.normalize), ("voxel", self.voxel))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Which voxels of a batch are the same place, from the true pose, and what a step draws: for training only."""
+"""Training targets: corresponding voxels of a batch under the true pose, and the sample of a step."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class FcgfTargets:
 
     positives: Tensor  # (P, 2) int64: rows of source and target
     anchors: Tensor  # (A,) int64: the drawn rows of positives
-    source_candidates: Tensor  # (c,) int64 rows of the source: among them the hardest negative is sought
+    source_candidates: Tensor  # (c,) int64 rows of the source: among them the hardest negative is searched
     target_candidates: Tensor  # (c,) int64 rows of the target
 
     def to(self, device: torch.device | str) -> FcgfTargets:
@@ -33,7 +33,7 @@ class FcgfTargets:
 def compute_targets(
     batch: FcgfBatch, transforms: Tensor, config: FcgfConfig, generator: torch.Generator
 ) -> FcgfTargets:
-    """Positives of a batch, and one draw of anchors and candidates.
+    """Positives of a batch, and one sample of anchors and candidates.
 
     Parameters
     ----------
@@ -45,7 +45,7 @@ def compute_targets(
     Raises
     ------
     ValueError
-        Another number of poses than of pairs.
+        The number of poses is not that of pairs.
     """
     transforms = transforms.reshape(-1, 4, 4).to(batch.source.points)
     if len(transforms) != len(batch.source.lengths):
@@ -87,7 +87,7 @@ def draw(
     config: FcgfLossConfig,
     generator: torch.Generator,
 ) -> FcgfTargets:
-    """Draw anchors and candidates anew: so many a pair, all of them from the whole batch.
+    """Draw new anchors and candidates: a number per pair, all of them from the whole batch.
 
     Parameters
     ----------

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: MIT
-"""The parts that are GeoTransformer's own (Qin et al. 2022)."""
+"""The parts specific to GeoTransformer (Qin et al. 2022)."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The GeoTransformer block: geometric self-attention and cross-attention in turns (docs/methods.md 6.6)."""
+"""The GeoTransformer block: alternating geometric self-attention and cross-attention (docs/methods.md 6.6)."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from hybridreg.learned.layers.attention import AttentionLayer
 
 
 class GeoTransformerBlock(nn.Module):
-    """Exchange features within and between the clouds; vanilla self-attention looks at no geometry."""
+    """Exchange features within and between the clouds; vanilla self-attention uses no geometry."""
 
     def __init__(self, config: TransformerConfig) -> None:
         super().__init__()
@@ -31,7 +31,7 @@ class GeoTransformerBlock(nn.Module):
         self, target: Tensor, source: Tensor, target_points: Tensor, source_points: Tensor
     ) -> tuple[Tensor, Tensor]:
         """Features (m, d), (n, d) at positions (m, 3), (n, 3) to (m, out), (n, out)."""
-        # One embedding a cloud serves all self layers: it is the largest tensor of the network.
+        # All self layers share one embedding a cloud: it is the largest tensor of the network.
         structures: tuple[Tensor | None, Tensor | None] = (None, None)
         if self.embedding is not None:
             structures = (self.embedding(target_points), self.embedding(source_points))
@@ -40,7 +40,7 @@ class GeoTransformerBlock(nn.Module):
                 target = layer(target, target, structures[0])
                 source = layer(source, source, structures[1])
             else:
-                # In this order: the source sees the target that has already seen the source.
+                # In this order: the source attends to the target that has already attended to the source.
                 target = layer(target, source)
                 source = layer(source, target)
         return self.out(target), self.out(source)

@@ -26,8 +26,7 @@ class KpconvFpn(nn.Module):
     """Encoder and decoder of any number of stages from one description.
 
     Stage 1 has a convolution and a residual block, every later stage a strided and two plain residual blocks;
-    widths double with the stage. The decoder stops at the fine stage. ``seed`` fixes the kernel points'
-    turns.
+    widths double with the stage. The decoder stops at the fine stage. ``seed`` fixes the kernel points' rotations.
     """
 
     def __init__(self, config: BackboneConfig, seed: int = 0) -> None:
@@ -87,7 +86,7 @@ class KpconvFpn(nn.Module):
 
 
 def block_plans(config: BackboneConfig) -> list[list[BlockPlan]]:
-    """The blocks of each stage: the whole plan of the encoder, from one description."""
+    """The blocks of each stage: the plan of the whole encoder."""
     return [_stage_plans(config, stage) for stage in range(config.stages)]
 
 
@@ -108,7 +107,7 @@ def _stage_plans(config: BackboneConfig, stage: int) -> list[BlockPlan]:
     dim = config.init_dim * 2**stage
     if stage == 0:
         return [plan(config.input_dim, dim, 0), plan(dim, 2 * dim, 0)]
-    # A strided block looks from the coarse points into the finer stage, with that stage's radius.
+    # A strided block queries the finer stage from the coarse points, with the finer stage's radius.
     return [plan(dim, dim, stage - 1, True), plan(dim, 2 * dim, stage), plan(2 * dim, 2 * dim, stage)]
 
 
@@ -119,7 +118,7 @@ def _block(plan: BlockPlan, first: bool, rng: np.random.Generator | None) -> nn.
 def plain_surroundings(
     pyramid: Pyramid, stage: int, cylindrical: bool = False, *, exact: bool = False
 ) -> Surroundings:
-    """Of a stage's points among themselves; stages count from 0."""
+    """Neighbourhoods of a stage's points within the stage; stages count from 0."""
     points, lengths, neighbors = pyramid.points[stage], pyramid.lengths[stage], pyramid.neighbors[stage]
     links = _links(points, points, neighbors, cylindrical, exact)
     return Surroundings(neighbors, lengths, lengths, links)
@@ -128,7 +127,7 @@ def plain_surroundings(
 def strided_surroundings(
     pyramid: Pyramid, stage: int, cylindrical: bool = False, *, exact: bool = False
 ) -> Surroundings:
-    """Of a stage's points among those of the finer stage before it."""
+    """Neighbourhoods of a stage's points in the finer stage before it."""
     neighbors = pyramid.subsampling[stage - 1]
     return Surroundings(
         neighbors,

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""How our tensors are called in GeoTransformer's published checkpoints."""
+"""Names of our tensors in GeoTransformer's published checkpoints."""
 
 from __future__ import annotations
 

@@ -18,7 +18,7 @@ _CHUNK_VALUES = 2**22
 
 
 class StructureEmbedding(nn.Module):
-    """One vector for each ordered pair of superpoints, unchanged by rigid motion.
+    """One vector for each ordered pair of superpoints, invariant to rigid motion.
 
     ``sigma_d`` in metres and ``sigma_a`` in degrees scale distance and angle; ``angle_k`` nearest superpoints
     span the angles.
@@ -54,11 +54,11 @@ class StructureEmbedding(nn.Module):
         if nearest.shape[1] == 0:  # a single superpoint spans no angle
             return embedding
         angles = neighbor_angles(points[block], points, points[nearest]) * self.angle_scale  # (b, n, k)
-        # One by one: the gradient of a largest value over a dimension makes four passes more.
+        # One by one: the gradient of a maximum over a dimension needs four more passes.
         return embedding.add_(reduce(torch.maximum, interpolate(curves[1], angles).unbind(2)))
 
     def _curve(self, layer: nn.Linear, highest: float) -> Tensor:
-        """Samples of the embedding of a number: n^2 (k + 1) sines and products would say no more."""
+        """Samples of the embedding of a number: n^2 (k + 1) sines and products would give no more accuracy."""
         return layer(sinusoids(sample_positions(highest, self.frequency), self.frequency))
 
 

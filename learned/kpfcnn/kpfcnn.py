@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """KPFCNN: the encoder and decoder of Predator and CoFiNet (Thomas et al. 2019, as D3Feat changed it).
 
-What its code does: the first unary layer of a residual block and its shortcut's are left out where widths agree, each
+As in its code, the first unary layer of a residual block and that of its shortcut are left out where widths agree, each
 normalisation runs over the points of both clouds, and no layer but the heads has a bias.
 """
 
@@ -25,7 +25,7 @@ from hybridreg.learned.pyramid.point_pyramid import Pyramid
 
 
 class KpfcnnEncoder(nn.Module):
-    """From the first stage to the coarsest. ``seed`` fixes how the kernel points of each layer are turned."""
+    """From the first stage to the coarsest. ``seed`` fixes the rotation of each layer's kernel points."""
 
     def __init__(self, config: KpfcnnConfig, seed: int = 0) -> None:
         super().__init__()
@@ -53,8 +53,8 @@ class KpfcnnEncoder(nn.Module):
 class KpfcnnDecoder(nn.Module):
     """From the superpoints back to the first stage.
 
-    Each unary layer halves the width that the decoder was given, and takes the skip's features beside, after the
-    upsampled ones. The last is a linear layer alone, to ``dim_out``, or to the next half where that is None.
+    Each unary layer halves the width that the decoder was given, and takes the skip's features after the upsampled
+    ones. The last is a linear layer alone, to ``dim_out``, or to the next half where that is None.
     """
 
     def __init__(self, config: KpfcnnConfig, dim_in: int, dim_out: int | None = None) -> None:
@@ -85,7 +85,7 @@ class KpfcnnDecoder(nn.Module):
         return features
 
     def steps(self, features: Tensor, skips: list[Tensor], pyramid: Pyramid) -> Iterator[tuple[int, Tensor]]:
-        """Place in the list of the decoder's blocks, and output, of each layer in turn."""
+        """Index in the list of the decoder's blocks, and output, of each layer."""
         stage, joins = pyramid.stages - 1, False
         for index, block in enumerate(self.config.decoding):
             if block == "nearest_upsample":

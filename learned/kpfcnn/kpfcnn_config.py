@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""KPFCNN, the encoder and decoder that Predator and CoFiNet share, planned from a list of blocks."""
+"""KPFCNN, the encoder and decoder that Predator and CoFiNet share, configured by a list of blocks."""
 
 from __future__ import annotations
 
@@ -11,13 +11,18 @@ from typing import Literal, NamedTuple
 from hybridreg.config import limits
 from hybridreg.learned.layers.kpconv_blocks import BlockPlan
 
-_WIDEST, _MOST_KERNEL_POINTS, _MOST_BLOCKS, _MOST_NEIGHBORS = 8192, 256, 64, 10_000
+# A configuration may come with untrusted weights: absurd sizes are refused before memory is allocated. By hand.
+_WIDEST = 8192  # channels
+_MOST_KERNEL_POINTS = 256
+_MOST_BLOCKS = 64
+_MOST_NEIGHBORS = 10_000  # of a point
 _ENCODING = ("simple", "simple_strided", "resnetb", "resnetb_strided")
 _DECODING = ("nearest_upsample", "unary", "last_unary")
 
 
 def architecture(residual: tuple[int, ...]) -> tuple[str, ...]:
-    """The list of blocks with so many residual blocks a stage, not counting strided ones, and the decoder to match."""
+    """The list of blocks with these numbers of residual blocks a stage, without strided ones, and the matching
+    decoder."""
     blocks = ["simple", *["resnetb"] * residual[0]]
     for count in residual[1:]:
         blocks += ["resnetb_strided", *["resnetb"] * count]
@@ -38,14 +43,14 @@ class KpfcnnConfig:
     """Encoder and decoder. Lengths in metres; stage s has voxel ``voxel * 2**s``.
 
     ``blocks`` is the "architecture" of the originals' configuration files: ``simple`` and ``resnetb`` and their
-    ``_strided`` forms, then ``nearest_upsample`` and ``unary`` in turn, at last ``last_unary``.
+    ``_strided`` forms, then alternating ``nearest_upsample`` and ``unary``, finally ``last_unary``.
     """
 
     blocks: tuple[str, ...] = architecture((1, 2, 2, 2))
     voxel: float = 0.3
     max_range: float | None = None  # metres from the cloud's median; farther points are left out
     base_radius: float = 4.25  # search radius in voxels of the stage
-    base_sigma: float = 2.0  # reach of a kernel point in voxels of the stage
+    base_sigma: float = 2.0  # influence radius of a kernel point in voxels of the stage
     neighbor_limits: tuple[int, ...] = (59, 59, 66, 63)
     init_dim: int = 256  # of the first residual block; doubles with each stage
     kernel_points: int = 15
@@ -76,7 +81,7 @@ class KpfcnnConfig:
         alone = any(pair == ("nearest_upsample",) * 2 for pair in pairwise(decoding))
         if alone or decoding[-1] != "last_unary" or decoding.count("last_unary") != 1:
             raise ValueError(
-                f"blocks end in {list(decoding)}: each nearest_upsample wants a unary after it, and the last block "
+                f"blocks end in {list(decoding)}: each nearest_upsample needs a unary after it, and the last block "
                 "must be the only last_unary"
             )
 
@@ -106,7 +111,7 @@ class KpfcnnConfig:
         ends: dict[int, int] = {}
         for block in self.encoder():
             ends[block.stage] = block.plan.dim_out
-        # A strided block computes at its coarser stage; before a first block that is strided there is the input alone.
+        # A strided block computes at its coarser stage; before a first block that is strided there is only the input.
         return tuple(ends.get(stage, 1) for stage in range(self.stages))
 
     @property
@@ -124,7 +129,7 @@ class KpfcnnConfig:
         for block in self.encoding:
             simple, strided = block.startswith("simple"), block.endswith("_strided")
             out = width // 2 if simple else width
-            # A strided block looks from the coarse points into the finer stage, with that stage's radius.
+            # A strided block queries the finer stage from the coarse points, with the finer stage's radius.
             yield EncoderBlock(simple, self._plan(dim, out, stage, strided), stage + strided)
             dim = out
             if strided:

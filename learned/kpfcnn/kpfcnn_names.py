@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""How the parts that Predator and CoFiNet share are called in their checkpoints."""
+"""Names in their checkpoints of the parts that Predator and CoFiNet share."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def attention_name(name: str) -> str:
 
 
 def nearest_config(tensors: Mapping[str, Tensor], key: str, radii: Mapping[str, float], origin: str) -> str:
-    """Which of several configurations has the search radius (m) that a layer's kernel points tell.
+    """Which of several configurations has the search radius (m) of a layer's kernel points.
 
     Kernel points lie within the radius, the outer ones at two thirds of it; published radii differ by a factor of 20.
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""How much memory a network on stacked clouds will take, told before it runs (Predator, CoFiNet)."""
+"""Memory estimate of a network on stacked clouds before it runs (Predator, CoFiNet)."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ _FLOAT = 4
 def encoder_bytes(pyramid: Pyramid, config: KpfcnnConfig, heads: int) -> int:
     """Estimated peak of a forward pass in bytes.
 
-    The skips stay; beside them either a stage of the encoder or decoder is at work, or the ``heads`` between them,
-    which take so many bytes.
+    The skips are kept; in addition either a stage of the encoder or decoder is active, or the ``heads`` between them,
+    with this number of bytes.
     """
     stages = range(pyramid.stages)
     skips = sum(len(pyramid.points[stage]) * config.skip_dims[stage] * _FLOAT for stage in stages)

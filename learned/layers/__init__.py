@@ -1,1 +1,2 @@
 # SPDX-License-Identifier: MIT
+"""Layers that several networks share: KPConv, sparse convolution, attention, normalisation, positions."""

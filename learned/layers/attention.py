@@ -48,8 +48,8 @@ class Attention(nn.Module):
         return merge_heads(weights @ split_heads(value, self.heads))
 
     def _structure_scores(self, query: Tensor, structure: Tensor) -> Tensor:
-        # q . (W r + b) = (q W) . r + q . b: projecting the n queries of each head instead of the n * m
-        # embeddings saves a factor of d / h in multiplications and an (n, m, d) tensor.
+        # q . (W r + b) = (q W) . r + q . b: projecting the n queries of each head instead of the n * m embeddings
+        # saves a factor of d / h in multiplications and an (n, m, d) tensor.
         assert self.structure is not None
         heads, _, width = query.shape
         weight = self.structure.weight.view(heads, width, -1)
@@ -59,7 +59,7 @@ class Attention(nn.Module):
 
 
 class AttentionLayer(nn.Module):
-    """Attention, linear, residual, LayerNorm; then two layers of twice the width, the same way."""
+    """Attention, linear, residual, LayerNorm; then a feed-forward part of twice the width, the same way."""
 
     def __init__(self, dim: int, heads: int, *, geometric: bool = False) -> None:
         super().__init__()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A smooth curve of one number, tabulated once and interpolated: for embeddings of very many numbers."""
+"""A smooth function of one number, tabulated once and interpolated: for embeddings of very many numbers."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from torch import Tensor
 
 from hybridreg.learned.layers.sparse_rows import Bags
 
-# Samples a unit. A cubic through four of them misses a sine of frequency 1 by 4e-7, float32's own rounding.
+# Samples per unit. A cubic through four of them is within 4e-7 of a sine of frequency 1, float32's own rounding.
 _DENSITY = 16
 
 
 def sample_positions(highest: float, like: Tensor) -> Tensor:
-    """Where to evaluate a curve (n,) that will be asked for at 0 to ``highest``."""
+    """Where to evaluate a curve (n,) that will be interpolated at 0 to ``highest``."""
     n = int(highest * _DENSITY) + 4
     return torch.arange(-1, n - 1, dtype=like.dtype, device=like.device) / _DENSITY
 
@@ -34,7 +34,7 @@ def interpolate(samples: Tensor, values: Tensor) -> Tensor:
 
 
 def _cubic_weights(t: Tensor) -> Tensor:
-    """Lagrange's weights (n, 4) of the samples at -1, 0, 1 and 2 for places ``t`` (n,) in [0, 1)."""
+    """Lagrange's weights (n, 4) of the samples at -1, 0, 1 and 2 at positions ``t`` (n,) in [0, 1)."""
     before, after, last = t + 1, t - 1, t - 2
     return torch.stack(
         [-t * after * last / 6, before * after * last / 2, -before * t * last / 2, before * t * after / 6],

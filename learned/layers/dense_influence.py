@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""The geometry of a KPConv with a place for every neighbour: what a graphics card wants (docs/methods.md 3.2).
+"""The dense geometry of a KPConv, one slot for every neighbour, for GPUs (docs/methods.md 3.2).
 
-The sparse form of `hybridreg.learned.layers.influence` does a tenth of the multiplications in some thirty times as many
-steps, each of which a card must be told of, and it has to ask the card how many neighbours each kernel point reaches.
+The sparse form of `hybridreg.learned.layers.influence` needs a tenth of the multiplications but some thirty times as
+many kernel launches, and it has to read back from the GPU how many neighbours each kernel point influences.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import torch
 from torch import Tensor
 from torch.nn import functional as F
 
-_NOWHERE = 1e6  # metres: a shadow lies beyond every kernel point
+_NOWHERE = 1e6  # metres: the position of the padding row, beyond every kernel point
 
 
 @dataclass(frozen=True)

@@ -9,9 +9,9 @@ from torch import Tensor
 def squared_distances(first: Tensor, second: Tensor, *, unit: bool = False) -> Tensor:
     """(..., n, c) and (..., m, c) to (..., n, m), not below 0.
 
-    The expanded square keeps only half of float32's digits for near points. It is used wherever a published
-    network decides by it (which patch, which partner), so that the decisions agree; searches for neighbours
-    subtract first. ``unit`` says that all rows have length one.
+    The expanded square keeps only half of float32's digits for near points. It is used wherever a published network
+    decides by it (which patch, which match), so that the decisions agree; neighbour searches subtract first. ``unit``
+    says that all rows have length one.
     """
     product = first @ second.transpose(-1, -2)
     if unit:

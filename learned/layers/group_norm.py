@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Group normalisation and LeakyReLU of point features in one step each way."""
+"""Group normalisation and LeakyReLU of point features, fused forward and backward."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ _EPS = 1e-5
 def group_norm(features: Tensor, weight: Tensor, bias: Tensor, groups: int, slope: float = 1.0) -> Tensor:
     """Normalise (N, C) over all rows and the channels of a group, scale, shift, then LeakyReLU.
 
-    ``weight`` and ``bias`` are (C,). torch's ``group_norm`` would want the rows transposed and back, and its
-    parts by hand pass over the features ten times in the gradient.
+    ``weight`` and ``bias`` are (C,). torch's ``group_norm`` would need the rows transposed and back, and separate
+    operations read the features ten times in the gradient.
     """
     if features.is_cuda:  # few steps matter more there than few passes
         normalised = F.group_norm(features.t()[None], groups, weight, bias, _EPS)[0].t()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Which neighbours reach which kernel points, and how strongly: the geometry of a KPConv (docs/methods.md 3.2)."""
+"""Influence of the neighbours on the kernel points: the sparse geometry of a KPConv (docs/methods.md 3.2)."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from hybridreg.learned.layers.sparse_rows import Bags
 
 @dataclass(frozen=True)
 class Links:
-    """The neighbours of all queries without the shadows, query after query; all layers of a stage share it."""
+    """The neighbours of all queries without padding, query after query; shared by all layers of a stage."""
 
     n_queries: int
     n_supports: int
@@ -29,8 +29,8 @@ class Links:
 
     def influence(self, kernel: Tensor, sigma: float) -> Influence:
         """Of every neighbour on every kernel point (K, 3) metres: ``max(0, 1 - |y_j - q_i - x_k| / sigma)``."""
-        # |a - x|^2 as |a|^2 - 2 a.x + |x|^2: one product, no (E, K, 3) tensor. One kernel point at a time, so that
-        # what is looked at stays in the cache.
+        # |a - x|^2 as |a|^2 - 2 a.x + |x|^2: one product, no (E, K, 3) tensor. One kernel point at a time, so that the
+        # data stays in the cache.
         factors = torch.cat([-2.0 * kernel, torch.ones_like(kernel[:, :1])], dim=1)
         constants = kernel.square().sum(1).tolist()
         parts = [
@@ -67,7 +67,7 @@ def find_links(
 class Influence:
     """The non-zero influences of a layer: for each kernel point, one bag of supports a query.
 
-    Only about a tenth of all (kernel point, query, neighbour) triples lie within the kernel points' reach:
+    Only about a tenth of all (kernel point, query, neighbour) triples lie within the kernel points' influence radius:
     the sparse form does a tenth of the multiplications of the dense one.
     """
 
@@ -138,7 +138,7 @@ def _reached(links: Links, factor: Tensor, constant: float, sigma: float) -> Bag
 
 
 def _positions(values: Tensor, limit: float) -> Tensor:
-    """Where a vector is below the limit."""
+    """Positions where a vector is below the limit."""
     # numpy compares ten times as fast as torch on the CPU, and finds the true ones five times as fast
     if values.device.type == "cpu":
         return torch.from_numpy(np.flatnonzero(values.numpy() < limit))

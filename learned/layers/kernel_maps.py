@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Which voxels a convolution kernel connects."""
+"""Kernel maps of sparse convolutions: which voxels a kernel connects."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class Pairs:
 
     @cached_property
     def transposed(self) -> Pairs:
-        """The same pairs turned round: MinkowskiEngine's transposed convolution, whose kernel is not flipped."""
+        """The same pairs swapped: MinkowskiEngine's transposed convolution, whose kernel is not flipped."""
         return Pairs(
             input=self.output,
             output=self.input,
@@ -68,7 +68,7 @@ class KernelMap:
 
     @cached_property
     def n_pairs(self) -> int:
-        """How many products there are."""
+        """Number of products."""
         return int((self.table < self.n_input).sum())
 
     @cached_property
@@ -91,7 +91,7 @@ class KernelMap:
 def kernel_offsets(size: int) -> Tensor:
     """(size^3, 3) int64 offsets (x, y, z) as MinkowskiEngine 0.5.4 numbers them (src/kernel_region.hpp).
 
-    x turns fastest; odd kernels are centred, even ones begin at 0.
+    x varies fastest; odd kernels are centred, even ones begin at 0.
     """
     z, y, x = torch.meshgrid(*[_line(size)] * 3, indexing="ij")
     return torch.stack([x, y, z], -1).reshape(-1, 3)

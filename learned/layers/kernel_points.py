@@ -10,12 +10,14 @@ import numpy.typing as npt
 
 _MEAN_RADIUS = 0.66
 _STEPS = 600
-_INNER, _OUTER = 0.45, 0.9  # radii of the half circles
+# Radii of the half circles, in search radii; by hand.
+_INNER = 0.45
+_OUTER = 0.9
 
 
 @lru_cache(maxsize=8)
 def _disposition(n_points: int) -> npt.NDArray[np.float64]:
-    """(n_points, 3): the first at the centre, the others pushed apart by 1/d and held together by 10 r^2."""
+    """(n_points, 3): the first at the centre, the others repelled by 1/d and attracted to the centre by 10 r^2."""
     rng = np.random.default_rng(0)
     points = rng.normal(size=(n_points, 3)) * 0.3
     points[0] = 0.0
@@ -45,8 +47,8 @@ def kernel_points(
     radius
         Search radius of the layer in metres.
     rng
-        Turns the disposition about z and shakes it by a normal of 0.01 radii, as the reference does for each
-        layer; ``None`` keeps it still, so that the layers of a stage can share it.
+        Rotates the points about z and adds normal noise of 0.01 radii, as the original does for each layer; ``None``
+        leaves them unchanged, so that the layers of a stage can share them.
 
     Returns
     -------
@@ -65,8 +67,8 @@ def kernel_points(
 def cylindrical_kernel_points(n_points: int, radius: float) -> npt.NDArray[np.float32]:
     """Kernel points (n_points, 3) float32 in metres for offsets folded about the vertical axis, all with y = 0.
 
-    One in the middle, the others evenly on two half circles about it: a neighbour's place is its distance from
-    the axis and its height, so that the convolution does not change when a cloud turns about the vertical.
+    One in the middle, the others evenly on two half circles around it: a neighbour's coordinates are its distance from
+    the axis and its height, so that the convolution is invariant to yaw.
     """
     inner = round((n_points - 1) * _INNER / (_INNER + _OUTER))
     places = [np.zeros((1, 2))]

@@ -60,8 +60,8 @@ def _positive_neighbors(features: Tensor, neighbors: Tensor) -> Tensor:
 class KPConv(nn.Module):
     """A kernel point convolution from ``dim_in`` to ``dim_out`` channels.
 
-    ``points`` (K, 3) are the kernel points and ``sigma`` their reach, in metres. GeoTransformer has a ``bias``,
-    Predator and CoFiNet have none.
+    ``points`` (K, 3) are the kernel points and ``sigma`` their influence radius, in metres. GeoTransformer has a
+    ``bias``, Predator and CoFiNet have none.
     """
 
     kernel: Tensor

@@ -23,7 +23,7 @@ _SLOPE = 0.1
 
 @dataclass(frozen=True)
 class Surroundings:
-    """What a block needs to know of the geometry: where it computes, from where, and through which links."""
+    """The geometry that a block needs: its queries, supports and links."""
 
     neighbors: Tensor  # (N, k) into the supports, pad M
     lengths: tuple[int, int]  # queries of the target, of the source
@@ -71,9 +71,9 @@ def point_norm(dim: int, groups: int | None, per_cloud: bool) -> PointGroupNorm 
 
 
 class Unary(nn.Module):
-    """Linear, then normalisation, then LeakyReLU unless ``activate`` is false.
+    """Linear layer, normalisation, and LeakyReLU unless ``activate`` is false.
 
-    ``groups`` None stands for instance normalisation, and for no bias, which it would take off again.
+    ``groups`` None means instance normalisation and no bias, which it would remove again.
     """
 
     def __init__(
@@ -171,10 +171,10 @@ def linear_on_joined(layer: nn.Module, coarse: Tensor, nearest: Tensor, skip: Te
 
 
 def upsample(features: Tensor, nearest: Tensor) -> Tensor:
-    """Each point takes the features of its coarse point, (M, C) and (N,) to (N, C); a shadow gives 0."""
+    """Each point takes the features of its coarse point, (M, C) and (N,) to (N, C); padding gives 0."""
     return F.embedding(nearest, pad_row(features))
 
 
 def pad_row(features: Tensor) -> Tensor:
-    """Append a row of zeros: what the shadow index points at."""
+    """Append a row of zeros, which the padding index refers to."""
     return torch.cat([features, features.new_zeros(1, features.shape[1])])

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Max-pooling over neighbours: no (queries, neighbours, channels) tensor either way."""
+"""Max-pooling over neighbours without a (queries, neighbours, channels) tensor, forward or backward."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ _CHUNK_VALUES = 2**16  # a quarter of a megabyte of the output at a time
 
 
 def max_pool(features: Tensor, neighbors: Tensor) -> Tensor:
-    """Largest feature of each query's neighbours, (M, C) and (N, k) to (N, C); a shadow (M) counts as 0.
+    """Largest feature of each query's neighbours, (M, C) and (N, k) to (N, C); padding (M) counts as 0.
 
     The gradient goes to the first of the neighbours that share the maximum.
     """
     padded = F.pad(features, (0, 0, 0, 1))
     if padded.requires_grad:
-        # slower than slot by slot, but it remembers where each maximum came from
+        # slower than slot by slot, but it keeps the index of each maximum
         return F.embedding_bag(neighbors, padded, mode="max")
     size = max(1, _CHUNK_VALUES // features.shape[1])
     return torch.cat([_largest(padded, rows.t().contiguous()) for rows in neighbors.split(size)])

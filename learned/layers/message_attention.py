@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Attention with a message MLP (Sarlin et al. 2020, SuperGlue) between two clouds, as Predator and CoFiNet have it."""
+"""Attention with a message MLP (Sarlin et al. 2020, SuperGlue) between two clouds, as in Predator and CoFiNet."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Masks = tuple[Tensor | None, Tensor | None]
 class InterleavedAttention(nn.Module):
     """Multi-head attention whose heads are interleaved: channel c of a projection belongs to head ``c % heads``.
 
-    Weights trained so load into attention with contiguous heads without complaint, and mean something else there.
+    Such weights load into attention with contiguous heads without an error, but give wrong results.
     """
 
     def __init__(self, dim: int, heads: int) -> None:
@@ -28,7 +28,7 @@ class InterleavedAttention(nn.Module):
         self.merge = nn.Linear(dim, dim)
 
     def forward(self, features: Tensor, memory: Tensor, mask: Tensor | None = None) -> Tensor:
-        """(..., n, d) attends to (..., m, d), of which ``mask`` (..., m) bool may leave some out."""
+        """(..., n, d) attends to (..., m, d), of which ``mask`` (..., m) bool may exclude some."""
         query, key, value = (
             self._split(layer(rows))
             for layer, rows in ((self.query, features), (self.key, memory), (self.value, memory))
@@ -44,7 +44,7 @@ class InterleavedAttention(nn.Module):
 
 
 class MessageLayer(nn.Module):
-    """What a cloud learns by attending: attention, then two layers on features and message side by side.
+    """The message of an attention layer: attention, then two layers on features and message concatenated.
 
     Between the two lies an instance normalisation over the cloud's own points.
     """
@@ -73,8 +73,8 @@ class MessageLayer(nn.Module):
 class MessageBlock(nn.Module):
     """Both clouds attend to themselves, or to each other; one set of weights, with a residual.
 
-    In a cross block the source goes first and the target attends to what the source has become, so that exchanging the
-    clouds changes the numbers.
+    In a cross block the source goes first and the target attends to the updated source, so that exchanging the clouds
+    changes the numbers.
     """
 
     def __init__(self, kind: Literal["self", "cross"], dim: int, heads: int) -> None:
@@ -83,7 +83,7 @@ class MessageBlock(nn.Module):
         self.layer = MessageLayer(dim, heads)
 
     def forward(self, clouds: Clouds, masks: Masks = (None, None)) -> Clouds:
-        """Features (..., n, d), (..., m, d) of source and target; ``masks`` leave rows out."""
+        """Features (..., n, d), (..., m, d) of source and target; ``masks`` exclude rows."""
         source, target = clouds
         if self.kind == "self":
             source = source + self.layer(source, source, masks[0], masks[0])

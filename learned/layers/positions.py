@@ -9,7 +9,7 @@ from typing import Literal
 import torch
 from torch import Tensor, nn
 
-_METRES = 40.0  # coordinates reach the network in units of the usual range
+_METRES = 40.0  # metres: unit of the coordinates, about the usual range
 
 
 def frequencies(dim: int) -> Tensor:
@@ -36,8 +36,8 @@ def image_grid_encoding(height: int, width: int, dim: int, device: torch.device)
 class PointPosition(nn.Module):
     """Encode superpoint positions (n, 3) in metres as (n, dim).
 
-    ``mlp`` sees coordinates about the points' centroid; ``radial`` sees only range and height in the sensor's
-    frame, which no yaw of the sensor changes; ``none`` gives zeros.
+    ``mlp`` uses coordinates about the points' centroid; ``radial`` only range and height in the sensor's frame, which
+    are invariant to yaw; ``none`` gives zeros.
     """
 
     def __init__(self, dim: int, kind: Literal["none", "mlp", "radial"]) -> None:

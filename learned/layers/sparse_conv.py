@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Sparse 3-D convolution in plain torch: gather, one matrix product an offset, add.
+"""Sparse 3-D convolution in plain torch: gather, one matrix product per offset, scatter-add.
 
-The tensors and what they mean are MinkowskiEngine's (0.5.4), so that weights trained there fit.
+Tensors have the layout of MinkowskiEngine (0.5.4), so that weights trained there fit.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from torch.nn import functional as F
 
 from hybridreg.learned.layers.kernel_maps import KernelMap, Pairs
 
-# Up to so many input channels a product with all offsets at once is cheaper than one product an offset.
+# Up to this many input channels one product with all offsets is cheaper than one product per offset.
 FEW_CHANNELS = 4
 
 
@@ -27,7 +27,8 @@ class SparseConv(nn.Module):
     dim_in, dim_out
         Channels.
     size
-        Edge of the kernel. Of an edge of 1 the kernel is a matrix (dim_in, dim_out), else (size^3, dim_in, dim_out).
+        Edge of the kernel. With an edge of 1 the kernel is a matrix (dim_in, dim_out), otherwise (size^3, dim_in,
+        dim_out).
     transposed
         Go back from the coarse voxels of a map to the fine ones. Initial weights are uniform within
         1 / sqrt(dim * size^3), ``dim`` the outputs of a transposed convolution and the inputs of others

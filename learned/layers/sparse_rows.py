@@ -25,7 +25,7 @@ class Bags:
 
     @cached_property
     def transposed(self) -> Bags:
-        """The same by row: what the gradient sums. Sorted once, however often it is needed."""
+        """The same by row, for the gradient. Sorted once, however often it is needed."""
         starts = F.pad(self.offsets, (0, 1), value=len(self.index))
         table = csr_array(
             tuple(part.numpy(force=True) for part in (self.weight, self.index, starts)),
@@ -49,7 +49,7 @@ class Bags:
 
 
 class _Sum(torch.autograd.Function):
-    # torch's own gradient sorts the index anew each time and adds row by row.
+    # torch's own gradient sorts the index each time and adds row by row.
     @staticmethod
     def forward(ctx: Any, rows: Tensor, bags: Bags) -> Tensor:
         ctx.bags = bags

@@ -26,7 +26,7 @@ class VoxelKeys:
         if float(extent.double().prod()) > 2**62:
             raise ValueError(
                 f"{extent[1:].tolist()} voxels cannot be numbered: a stray point lies far from the others (crop the "
-                "cloud), or the voxel is too small for it"
+                "cloud), or the voxel is too small"
             )
         return cls(low, extent)
 

@@ -64,7 +64,7 @@ def _with_cloud(coords: Tensor) -> Tensor:
 class VoxelPyramid:
     """Levels of voxels, each floored to a multiple of its stride, and the kernel maps between them.
 
-    Rows of a level are sorted by cloud, z, y, x. Maps are made when they are first asked for, and kept.
+    Rows of a level are sorted by cloud, z, y, x. Maps are built on first access, and kept.
 
     Parameters
     ----------

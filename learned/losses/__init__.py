@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: MIT
-"""Losses that several networks use."""
+"""Shared losses: circle (coarse), assignment (fine), overlap mask, InfoNCE."""

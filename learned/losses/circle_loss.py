@@ -41,8 +41,7 @@ def circle_loss(target: Tensor, source: Tensor, overlap: Tensor, config: LossCon
     Returns
     -------
     Tensor
-        Scalar. Where no row or no column has both a positive and a negative, that half is 0 and keeps the
-        graph.
+        Scalar. Where no row or no column has both a positive and a negative, that half is 0 and keeps the graph.
     """
     # 1e-12 keeps the gradient of the root finite where two features agree.
     distance = (squared_distances(target, source, unit=True) + 1e-12).sqrt()
@@ -84,8 +83,7 @@ def circle(
 def _exponents(
     distance: Tensor, positive: Tensor, negative: Tensor, weight: Tensor | float, config: CircleMargins
 ) -> tuple[Tensor, Tensor]:
-    # Entries that are neither get weight 0, hence exponent 0: a constant in the sum, as in the published
-    # loss.
+    # Entries that are neither get weight 0, hence exponent 0: a constant in the sum, as in the published loss.
     fixed = distance.detach()
     pull_weight = (fixed - config.positive_optimal).clamp_min(0.0) * weight * positive
     push_weight = (config.negative_optimal - fixed).clamp_min(0.0) * negative

@@ -14,7 +14,7 @@ from hybridreg.learned.matching.procrustes import apply_transform
 def assignment_loss(
     assignment: Tensor, pairs: PatchPairs, target: Tensor, source: Tensor, transform: Tensor, radius: float
 ) -> Tensor:
-    """Minus the mean log-assignment of true partners, and of the slack for points without one.
+    """Minus the mean log-assignment of true correspondences, and of the slack for points without one.
 
     Parameters
     ----------
@@ -27,7 +27,7 @@ def assignment_loss(
     transform
         (4, 4) true ``T_target_source``.
     radius
-        Points closer than this under the true pose are partners, metres.
+        Points closer than this under the true pose correspond, metres.
     """
     labels = true_assignment(pairs, target, source, transform, radius)
     if not bool(labels.any()):
@@ -38,7 +38,7 @@ def assignment_loss(
 def true_assignment(
     pairs: PatchPairs, target: Tensor, source: Tensor, transform: Tensor, radius: float
 ) -> Tensor:
-    """(B, n + 1, m + 1) bool: true partners, and the slack of valid points that have none."""
+    """(B, n + 1, m + 1) bool: true correspondences, and the slack of valid points that have none."""
     points_target = pad_row(target)[pairs.target_index]
     points_source = apply_transform(pad_row(source)[pairs.source_index], transform)
     near = squared_distances(points_target, points_source) < radius**2

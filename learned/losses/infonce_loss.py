@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Dense InfoNCE at the fine stage: each point with a partner must find it among all points (docs/methods.md 10.4)."""
+"""Dense InfoNCE at the fine stage: each point must find its true correspondence among all points (docs/methods.md
+10.4)."""
 
 from __future__ import annotations
 
@@ -17,18 +18,18 @@ class InfoNceConfig:
     """Contrastive warm-up of the backbone. Lengths count in voxels of the network's first stage."""
 
     anchors: int = 384
-    partner: float = 2.0  # a point has a partner nearer than this: the spacing of the fine points
-    exclusion: float = 3.0  # other points nearer than this to the partner are no negatives
+    partner: float = 2.0  # a point corresponds to one nearer than this: the spacing of the fine points
+    exclusion: float = 3.0  # other points nearer than this to the true correspondence are not negatives
     temperature: float = 0.07
     symmetric: bool = True
 
 
 @dataclass(frozen=True)
 class InfoNce:
-    """The loss, and how many anchors already find their partner's surroundings."""
+    """The loss, and how many anchors already find the vicinity of their correspondence."""
 
     loss: Tensor
-    hits: Tensor  # share of anchors whose best point lies within the exclusion radius of the partner
+    hits: Tensor  # share of anchors whose best point lies within the exclusion radius of the true correspondence
 
 
 def infonce(
@@ -40,7 +41,7 @@ def infonce(
     voxel: float,
     generator: torch.Generator,
 ) -> InfoNce:
-    """Cross-entropy of finding each anchor's partner among all candidates.
+    """Cross-entropy of finding each anchor's true correspondence among all candidates.
 
     Parameters
     ----------
@@ -59,7 +60,7 @@ def infonce(
     Returns
     -------
     InfoNce
-        A loss of 0 that keeps the graph where no anchor has a partner.
+        A loss of 0 that keeps the graph where no anchor has a correspondence.
     """
     usable = (partner >= 0).nonzero()[:, 0]
     drawn = torch.randperm(len(usable), generator=generator)[: config.anchors].to(partner.device)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What a training loop asks of losses, and the plainest form of them."""
+"""The interface of losses to the training loop, and its simplest form."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from torch import Tensor
 
 
 class Losses(Protocol):
-    """What `Pretrained.losses` gives."""
+    """What `Pretrained.losses` returns."""
 
     @property
     def total(self) -> Tensor:
@@ -23,11 +23,11 @@ class Losses(Protocol):
 
     @property
     def hits(self) -> Tensor | None:
-        """Share of the step's answers that were right; None where the losses do not tell."""
+        """Share of correct matches of the step; None where the losses do not give it."""
 
 
 class LossParts(dict[str, Tensor]):
-    """Losses by name that are weighed already."""
+    """Losses by name, already weighted."""
 
     @property
     def total(self) -> Tensor:
@@ -36,10 +36,10 @@ class LossParts(dict[str, Tensor]):
 
     @property
     def parts(self) -> Mapping[str, Tensor]:
-        """Themselves."""
+        """The losses themselves."""
         return self
 
     @property
     def hits(self) -> Tensor | None:
-        """They do not tell."""
+        """Not available."""
         return None

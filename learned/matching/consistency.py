@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Which matches agree with one another: right ones keep all distances, wrong ones keep few by chance.
+"""Consistency of matches: correct ones preserve all mutual distances, wrong ones preserve few by chance.
 
 Spectral matching (Leordeanu and Hebert, ICCV 2005) with the compatibility of SC2-PCR and MAC, ``1 - (d - d')^2 / s^2``.
 """
@@ -9,16 +9,16 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
-# Matches compared with each other, the heaviest first: a square matrix of 36 MB.
+# Matches compared with each other, those with the largest weights: a square matrix of 36 MB.
 _MOST = 3000
-# Power iterations; the leading eigenvector stands out clearly where there is one.
+# Power iterations; the leading eigenvector is well separated where there is one.
 _ITERATIONS = 20
-# Share of the best match's agreement that a match needs.
+# Share of the best match's consistency that a match needs.
 _SHARE = 0.3
 
 
 def consistent(target: Tensor, source: Tensor, weight: Tensor, reach: float) -> Tensor:
-    """Which of the matches belong to the largest group that moves as one.
+    """Which of the matches belong to the largest mutually consistent group.
 
     Parameters
     ----------

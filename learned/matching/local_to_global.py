@@ -16,12 +16,12 @@ _CHUNK_VOTES = 2**22
 
 @dataclass(frozen=True)
 class LgrEstimate:
-    """A pose and how it came about."""
+    """A pose and how it was found."""
 
     transform: Tensor  # (4, 4): T_target_source
     inliers: Tensor  # (C,) bool: within the acceptance radius of the final pose
-    hypotheses: int  # groups that proposed a pose; 0 means that the start was a fit to everything
-    proposals: Tensor  # (g, 4, 4): of all groups that made one, most votes first
+    hypotheses: int  # groups that proposed a pose; 0 means that the start was a fit to all matches
+    proposals: Tensor  # (g, 4, 4): proposals of all groups, most votes first
 
 
 def local_to_global(
@@ -39,7 +39,7 @@ def local_to_global(
     group
         (C,) int64; any labels in any order. Groups of fewer than ``min_group`` propose nothing but vote.
     config
-        Radius, smallest group, steps, cap on voters.
+        Radius, smallest group, steps, limit on voters.
 
     Raises
     ------

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Pairs of patches: the padded fine points whose assignment is sought, and groups of pairs of like size."""
+"""Pairs of patches: the padded fine points to be assigned, and groups of pairs of similar size."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from torch import Tensor
 
 from hybridreg.learned.pyramid.patches import Patches
 
-# Values of one chunk's score matrices: half a megabyte stays in the second-level cache.
+# Values of one chunk's score matrices: half a megabyte fits the second-level cache.
 _CHUNK_VALUES = 2**17
 
 
@@ -22,7 +22,7 @@ class PatchPairs:
     target_mask: Tensor  # (B, n) bool
     source_index: Tensor  # (B, m) int64
     source_mask: Tensor  # (B, m) bool
-    group: Tensor  # (B,) int64: the pair's place among all pairs
+    group: Tensor  # (B,) int64: the pair's index among all pairs
 
     def __len__(self) -> int:
         return len(self.group)
@@ -50,7 +50,7 @@ def pair_patches(target: Patches, source: Patches, target_nodes: Tensor, source_
 
 
 def size_chunks(pairs: PatchPairs) -> list[PatchPairs]:
-    """The pairs sorted by size, in chunks cut to the largest pair of each: padding is not computed with."""
+    """The pairs sorted by size, in chunks cut to the largest pair of each: so that little padding is computed."""
     if len(pairs) == 0:
         return []
     n_rows, n_columns = pairs.target_mask.sum(1), pairs.source_mask.sum(1)

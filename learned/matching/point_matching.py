@@ -27,7 +27,7 @@ class PointMatches:
         return len(self.weight)
 
     def only(self, chosen: Tensor) -> PointMatches:
-        """Those of a mask (C,), or all where it leaves none."""
+        """The matches of a mask (C,), or all where it leaves none."""
         if not bool(chosen.any()):
             return self
         return PointMatches(*(getattr(self, name)[chosen] for name in PointMatches.__dataclass_fields__))
@@ -38,7 +38,7 @@ def mutual_top_k(
 ) -> Tensor:
     """Which entries (B, n, m) are among the ``topk`` of their row and column, above ``threshold`` and valid.
 
-    With ``mutual`` false the row or the column is enough.
+    With ``mutual`` false the row or the column suffices.
     """
     by_row = _among_top(probability, topk, 2)
     by_column = _among_top(probability, topk, 1)

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""All fine points of two clouds held against each other: votes for pairs of superpoints, and how unique a match is.
+"""Similarities of all fine points of two clouds: votes for superpoint pairs, and the uniqueness of matches.
 
-Not in the published networks. There the superpoints' own features must find the partner, which takes far more training
-than the fine features do: those compare a point with thousands of others in every step (docs/methods.md 10.4).
+Not in the published networks. There the superpoints' own features must find the match, which takes far more training
+than fine features need: those compare a point with thousands of others in every step (docs/methods.md 10.4).
 """
 
 from __future__ import annotations
@@ -49,16 +49,16 @@ class PointSimilarity:
     source_total: Tensor
 
     def uniqueness(self, target_index: Tensor, source_index: Tensor) -> Tensor:
-        """How surely each of two points (C,), (C,) finds the other among all: the product of both softmaxes, (C,)."""
+        """Uniqueness of matches of points (C,), (C,) among all: the product of both softmaxes, (C,)."""
         score = (self.target[target_index] * self.source[source_index]).sum(1)
         return torch.exp(2.0 * score - self.target_total[target_index] - self.source_total[source_index])
 
 
 def compare_points(target: Voters, source: Voters, temperature: float) -> PointSimilarity:
-    """Hold every point against every point of the other cloud.
+    """Compare every point with every point of the other cloud.
 
-    Each point gives one vote in all, shared among the other cloud's superpoints by a softmax of its best score within
-    each patch. A pair of superpoints gets the product of what both sides give it.
+    Each point has one vote, distributed over the other cloud's superpoints by a softmax of its best score within each
+    patch. A superpoint pair gets the product of the votes of both sides.
     """
     at_target, at_source = ((voters.owner >= 0).nonzero()[:, 0] for voters in (target, source))
     features = [F.normalize(voters.features, dim=1) / temperature**0.5 for voters in (target, source)]

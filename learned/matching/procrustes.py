@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Weighted Procrustes (Kabsch): the rigid motion that best moves source onto target (docs/methods.md 9.1)."""
+"""Weighted Procrustes (Kabsch): the least-squares rigid motion from source to target (docs/methods.md 9.1)."""
 
 from __future__ import annotations
 

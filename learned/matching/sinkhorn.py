@@ -10,9 +10,9 @@ from torch import Tensor, nn
 
 _MINUS_INFINITY = -1e12
 _TINY = 1e-38
-# Potentials that move farther than e^40 from their start leave too little of float32's range.
+# Potentials that change by more than a factor e^40 leave too little of float32's range.
 _MAX_CHANGE = 40.0
-# No iteration moves log potentials farther than the one before (log-sum-exp is 1-Lipschitz): once they move by
+# No iteration changes log potentials more than the one before (log-sum-exp is 1-Lipschitz): once they move by
 # less than this, a hundred more iterations change nothing above 5e-5.
 _SETTLED = 5e-7
 _CHECK_EVERY = 8
@@ -44,7 +44,7 @@ class OptimalTransport(nn.Module):
 
 
 def log_sinkhorn(scores: Tensor, rows: Tensor, columns: Tensor, alpha: Tensor, iterations: int) -> Tensor:
-    """The log-domain iteration: slow, safe for any scores, and what the networks are trained through."""
+    """The log-domain iteration: slow, safe for any scores, and used in training."""
     padded = _with_slack(scores, rows, columns, alpha)
     log_mu, log_nu, norm = _log_marginals(rows, columns, scores.dtype)
     u, v = torch.zeros_like(log_mu), torch.zeros_like(log_nu)
@@ -55,11 +55,11 @@ def log_sinkhorn(scores: Tensor, rows: Tensor, columns: Tensor, alpha: Tensor, i
 
 
 def kernel_sinkhorn(scores: Tensor, rows: Tensor, columns: Tensor, alpha: Tensor, iterations: int) -> Tensor:
-    """The same by products with ``exp(scores)``, for a tenth of the time.
+    """The same by products with ``exp(scores)``, in a tenth of the time.
 
     The first iteration is done on logarithms and its potentials go into the kernel, which is then of the
-    order of the marginals whatever the scores: only their change has to fit float32. The pairs for which it
-    does not are done again in the log form. Iterations that would change nothing are left out.
+    order of the marginals whatever the scores: only their change has to fit float32. Pairs for which it does not are
+    recomputed in the log form. Iterations that would change nothing are skipped.
     """
     if len(scores) == 0 or iterations < 2:
         return log_sinkhorn(scores, rows, columns, alpha, iterations)

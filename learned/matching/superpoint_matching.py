@@ -13,7 +13,7 @@ from hybridreg.learned.layers.distances import squared_distances
 
 @dataclass(frozen=True)
 class SuperpointMatches:
-    """Pairs of superpoints, best first; one superpoint may stand in several."""
+    """Superpoint pairs, best first; one superpoint may occur in several."""
 
     target: Tensor  # (K,) int64
     source: Tensor  # (K,) int64

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What OMNet takes: as many points of every cloud, normalised. No truth."""
+"""The input of OMNet: equally many points of every cloud, normalised. No ground truth."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from torch import Tensor
 
 @dataclass(frozen=True, kw_only=True)
 class OmnetBatch:
-    """Pairs of point clouds, each pair in units of its own."""
+    """Pairs of point clouds, each pair in its own units."""
 
     source: Tensor  # (B, N, 3)
     target: Tensor  # (B, M, 3)
@@ -54,23 +54,23 @@ def make_batch(
     centres: tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]] | None = None,
     device: torch.device | str = "cpu",
 ) -> tuple[OmnetBatch, Units]:
-    """A pair as the network takes it: some of the points, about a centre, divided by the larger reach of the two.
+    """The network's input of a pair: a sample of the points, centred, divided by the larger radius of the two.
 
     Parameters
     ----------
     target, source
         (M, 3), (N, 3) metres.
     points
-        How many of each; a cloud with fewer gives some of them more than once, as in the published training.
+        Number of points of each; a cloud with fewer repeats some, as in the published training.
     rng
         Chooses the points. The order of the clouds' points does not matter.
     centres
-        Of target and source, such as where the sensors stood; by default the origins.
+        Of target and source, such as the sensors' positions; by default the origins.
 
     Raises
     ------
     ValueError
-        A cloud without points, or points that are all at their centre.
+        A cloud without points, or with all points at its centre.
     """
     at = centres or (np.zeros(3), np.zeros(3))
     clouds = []
@@ -99,7 +99,7 @@ def _choice(cloud: npt.NDArray[np.float64], points: int, rng: np.random.Generato
 
 
 def collate(batches: Sequence[OmnetBatch]) -> OmnetBatch:
-    """Several pairs as one batch, of which a training step needs two at least."""
+    """Several pairs as one batch; a training step needs at least two."""
     return OmnetBatch(
         source=torch.cat([batch.source for batch in batches]),
         target=torch.cat([batch.target for batch in batches]),

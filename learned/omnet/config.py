@@ -11,8 +11,11 @@ from typing import Any, Literal
 from hybridreg.config import limits
 from hybridreg.config.plain_values import build
 
-# What no network has is refused before memory is asked for it.
-_WIDEST, _MOST_LAYERS, _MOST_ITERATIONS, _MOST_POINTS = 8192, 16, 32, 100_000
+# A configuration may come with untrusted weights: absurd sizes are refused before memory is allocated. By hand.
+_WIDEST = 8192  # channels
+_MOST_LAYERS = 16
+_MOST_ITERATIONS = 32
+_MOST_POINTS = 100_000
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -24,9 +27,9 @@ class OmnetLossConfig:
     ``mask_form``: "torch" divides the weighted cross-entropy by the sum of the weights of the whole batch; "megengine"
     (the first release) by each cloud's own, and takes the mean over the batch.
     ``labels``: "masked" as released: points that the iteration's input mask left out count as not overlapping, and so
-    do points whose only partners it left out, so that labels depend on the network's earlier masks. "true" is the
-    right one: the overlap of the whole clouds in every iteration.
-    ``signed``: true as released: q and -q, one and the same turn, are held to be different, and a turn predicted with a
+    do points whose only correspondences it left out, so that labels depend on the network's earlier masks. "true" is
+    the correct one: the overlap of the whole clouds in every iteration.
+    ``signed``: true as released: q and -q, the same rotation, count as different, and a rotation predicted with a
     negative w costs up to 2. False takes the nearer of the two.
     """
 
@@ -59,9 +62,9 @@ class OmnetConfig:
     fusion: tuple[int, ...] = (1024, 1024, 512)
     decoder: tuple[int, ...] = (512, 256, 256)
     regression: tuple[int, ...] = (2048, 1024, 512, 256)
-    iterations: int = 4  # each with weights of its own
-    mask_delay: int = 2  # so many iterations see every point; later ones the mask of the iteration before
-    points: int = 717  # of each cloud that the stage looks at
+    iterations: int = 4  # each with its own weights
+    mask_delay: int = 2  # iterations that see every point; later ones see the mask of the iteration before
+    points: int = 717  # of each cloud that the stage uses
     normalize_eps: float = 1e-12  # least length of a quaternion before it is divided by it
     bn_eps: float = 1e-5
     bn_momentum: float = 0.1

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What a training step of OMNet looks at."""
+"""Training examples of OMNet."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from hybridreg.learned.true_pair import TruePair
 
 
 def example(pair: TruePair, config: OmnetConfig, rng: np.random.Generator) -> tuple[OmnetBatch, OmnetTargets]:
-    """Some points of a pair in units of its own, as the stage takes them, and the true pose in these units.
+    """A sample of a pair's points in its own units, as in the stage, and the true pose in these units.
 
     Raises
     ------
@@ -29,7 +29,7 @@ def example(pair: TruePair, config: OmnetConfig, rng: np.random.Generator) -> tu
 
 
 def collate(examples: Sequence[tuple[OmnetBatch, OmnetTargets]]) -> tuple[OmnetBatch, OmnetTargets]:
-    """Several pairs as one step, which needs two at least."""
+    """Several pairs as one step, which needs at least two."""
     targets = [each for _, each in examples]
     return batches.collate([batch for batch, _ in examples]), OmnetTargets(
         transform=torch.cat([each.transform for each in targets]),

@@ -45,7 +45,7 @@ class Encoder(nn.Module):
             if i + 1 == self.local_layer:
                 local = x
         last = x * mask
-        # Zeros take part in the maximum; after a ReLU that is no other than leaving the points out.
+        # Zeros take part in the maximum; after a ReLU that equals leaving the points out.
         return local * mask, last, last.amax(2)
 
 

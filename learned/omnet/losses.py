@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""OMNet's losses of every iteration: overlap masks in both published forms, and poses (loss/loss.py)."""
+"""OMNet's losses of every iteration: overlap masks in both published forms, and poses (loss/loss.py; docs/methods.md
+11.4)."""
 
 from __future__ import annotations
 
@@ -30,7 +31,7 @@ class OmnetLosses(LossParts):
 
 
 def omnet_losses(output: OmnetOutput, targets: OmnetTargets, config: OmnetLossConfig) -> OmnetLosses:
-    """Weighed losses by name: ``mask_i``, ``quaternion_i`` and ``translation_i`` of every iteration i."""
+    """Weighted losses by name: ``mask_i``, ``quaternion_i`` and ``translation_i`` of every iteration i."""
     found = OmnetLosses()
     for i, step in enumerate(output.steps):
         labels = step_labels(output, step, targets, config)
@@ -47,7 +48,8 @@ def omnet_losses(output: OmnetOutput, targets: OmnetTargets, config: OmnetLossCo
 def step_labels(
     output: OmnetOutput, step: Step, targets: OmnetTargets, config: OmnetLossConfig
 ) -> tuple[Tensor, Tensor]:
-    """(B, N), (B, M) bool: the points that overlap, of those that the iteration saw (see `OmnetLossConfig.labels`)."""
+    """(B, N), (B, M) bool: the points that overlap, among those that the iteration saw (see
+    `OmnetLossConfig.labels`)."""
     masks = (step.source_mask, step.target_mask) if config.labels == "masked" else None
     return overlap_labels(output.source, output.target, masks, targets.transform, config.overlap_distance)
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""OMNet: a pose regressed four times, at last on the points alone that were held to overlap (Xu et al. 2021)."""
+"""OMNet: a pose regressed in four iterations, the last ones on the predicted overlap (Xu et al. 2021)."""
 
 from __future__ import annotations
 
@@ -26,21 +26,21 @@ from hybridreg.learned.weights import load_official_tensors
 
 @dataclass(frozen=True, kw_only=True)
 class Step:
-    """One iteration: what it saw and what it made of it."""
+    """One iteration: its input and its output."""
 
     source_points: Tensor  # (B, N, 3) as moved by the iterations before
-    source_mask: Tensor  # (B, N) bool: points that it was allowed to see
+    source_mask: Tensor  # (B, N) bool: its input mask
     target_mask: Tensor  # (B, M) bool
     source_logits: Tensor  # (B, 2, N) of not overlapping and overlapping, for the next iteration
     target_logits: Tensor  # (B, 2, M)
-    pooled: Tensor  # (B, p) what the pose was regressed from
+    pooled: Tensor  # (B, p) the input of the regression
     pose_step: Tensor  # (B, 7) unit quaternion (w first) and translation of this iteration alone
     pose: Tensor  # (B, 7) of all so far: source to target
 
 
 @dataclass(frozen=True, kw_only=True)
 class OmnetOutput:
-    """All iterations, and the clouds that they looked at."""
+    """All iterations, and their input clouds."""
 
     steps: tuple[Step, ...]
     source: Tensor  # (B, N, 3)
@@ -53,10 +53,10 @@ class OmnetOutput:
 
 
 class OmnetNetwork(Pretrained):
-    """Poses of a batch of pairs. No part of it takes a ground truth.
+    """Poses of a batch of pairs. No part of it takes the ground truth.
 
-    A pose never sees the mask of its own iteration: the first ``mask_delay`` iterations see every point, each later one
-    those that the iteration before held to overlap. No gradient goes through masks or from one iteration to another.
+    A pose never sees the mask of its own iteration: the first ``mask_delay`` iterations see every point, each later
+    one those in the overlap predicted by the iteration before. No gradient passes through masks or between iterations.
     """
 
     name: ClassVar[str] = "omnet"
@@ -104,7 +104,7 @@ class OmnetNetwork(Pretrained):
 
     def step(self, i: int, batch: OmnetBatch, masks: list[Tensor], before: Step | None) -> Step:
         """Iteration ``i`` on the points that the masks (B, N), (B, M) of source and target leave."""
-        # As published, the moved points are moved on by the last step, not the first ones by the composed pose.
+        # As published, the moved points are moved again by the last step, not the original ones by the composed pose.
         source = batch.source
         if before is not None:
             step = before.pose_step.detach()
@@ -132,14 +132,14 @@ class OmnetNetwork(Pretrained):
         )
 
     def losses(self, output: OmnetOutput, targets: OmnetTargets) -> OmnetLosses:
-        """Weighed losses of every iteration by name (``mask_0``, ``quaternion_0``, ``translation_0``, ...).
+        """Weighted losses of every iteration by name (``mask_0``, ``quaternion_0``, ``translation_0``, ...).
 
-        Their sum is what is trained.
+        Their sum is trained.
         """
         return omnet_losses(output, targets, self.config.loss)
 
     def memory(self, batch: OmnetBatch) -> int:
-        """Estimated peak of a forward pass in bytes, beside what the process and the batch hold already."""
+        """Estimated peak of a forward pass in bytes, on top of what the process and the batch already hold."""
         config, points = self.config, batch.source.shape[1] + batch.target.shape[1]
         # A layer's input, output and the steps between; both clouds' fused, decoded and local features beside them.
         inner = max(
@@ -161,7 +161,8 @@ class OmnetNetwork(Pretrained):
             A ``.pth`` as published.
         size
             A configuration or its name. By default layers, widths and iterations are read from the tensors' shapes; the
-            mask delay (2), which layer is a point's own (the second) and the losses are those of all published weights.
+            mask delay (2), which layer gives a point's own features (the second) and the losses are those of all
+            published weights.
 
         Raises
         ------

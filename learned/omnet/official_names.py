@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""How our tensors are called in OMNet's published checkpoints, and what the checkpoints' shapes tell."""
+"""Names of our tensors in OMNet's published checkpoints, and the configuration from a checkpoint's shapes."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def config_of(tensors: Mapping[str, Tensor], origin: str) -> OmnetConfig:
     Raises
     ------
     ValueError
-        The first iteration lacks a part: these are no weights of OMNet.
+        The first iteration lacks a part: these are not weights of OMNet.
     """
 
     def widths(part: str, block: str) -> tuple[int, ...]:
@@ -40,7 +40,7 @@ def config_of(tensors: Mapping[str, Tensor], origin: str) -> OmnetConfig:
             found.append(weight.shape[0])
         if not found:
             raise ValueError(
-                f"{origin}: tensor {part}.0.{block}1.0.weight is missing, or no matrix; these are no weights of OMNet"
+                f"{origin}: tensor {part}.0.{block}1.0.weight is missing, or not a matrix: no weights of OMNet"
             )
         return tuple(found)
 

@@ -16,7 +16,7 @@ def pose_errors(estimated: Array, true: Array, euler: Literal["xyz", "zyx"]) -> 
     """Means over a batch of poses (B, 3, 4).
 
     The published numbers take the root of ``R_MSE`` and ``t_MSE`` after the mean over the data set. They are not
-    comparable between the two ModelNet styles, whose Euler angles are taken in another order.
+    comparable between the two ModelNet styles, whose Euler angles are in a different order.
 
     Parameters
     ----------
@@ -27,7 +27,7 @@ def pose_errors(estimated: Array, true: Array, euler: Literal["xyz", "zyx"]) -> 
     -------
     dict
         ``R_MSE`` (degrees squared) and ``R_MAE`` (degrees) of the Euler angles, ``t_MSE`` and ``t_MAE`` of the
-        translation's components; ``Err_R`` (degrees), the angle of the remaining turn, ``Err_t``, the length of the
+        translation's components; ``Err_R`` (degrees), the angle of the remaining rotation, ``Err_t``, the length of the
         translation's error, and ``score`` = 0.01 ``Err_R`` + ``Err_t``, by which checkpoints were chosen.
     """
     turns = [Rotation.from_matrix(pose[:, :, :3]) for pose in (estimated, true)]

@@ -8,7 +8,8 @@ from torch import Tensor
 
 
 def multiply(first: Tensor, second: Tensor) -> Tensor:
-    """(..., 4) the turn ``first``, then the turn ``second``: Hamilton's product ``second * first``. Not normalised."""
+    """(..., 4) the rotation ``first``, then the rotation ``second``: Hamilton's product ``second * first``. Not
+    normalised."""
     b, a = first.unbind(-1), second.unbind(-1)
     return torch.stack(
         [
@@ -22,7 +23,7 @@ def multiply(first: Tensor, second: Tensor) -> Tensor:
 
 
 def rotate(quaternion: Tensor, points: Tensor) -> Tensor:
-    """Points (..., n, 3) turned by quaternions (..., 4)."""
+    """Points (..., n, 3) rotated by quaternions (..., 4)."""
     w, v = quaternion[..., None, :1], quaternion[..., None, 1:].expand_as(points)
     across = torch.linalg.cross(v, points)
     return points + 2.0 * (w * across + torch.linalg.cross(v, across))
@@ -49,7 +50,7 @@ def matrix_of(pose: Tensor) -> Tensor:
 def pose_of(matrix: Tensor) -> Tensor:
     """(..., 7) of matrices (..., 3 or 4, 4), with w not negative.
 
-    From the largest of the four components, which loses no digits for any turn.
+    From the largest of the four components, which loses no digits for any rotation.
     """
     R = matrix[..., :3, :3]
     xx, yy, zz = R[..., 0, 0], R[..., 1, 1], R[..., 2, 2]

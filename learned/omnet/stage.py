@@ -21,16 +21,16 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class OmNet(NetworkStage):
-    """Regress the pose from the clouds alone, four times over, on the points that overlap (Xu et al. 2021).
+    """Regress the pose from the clouds alone, in four iterations on the predicted overlap (Xu et al. 2021).
 
-    Looks at a random choice of the levels' points (as many of each as its configuration says), each cloud about the
-    place that it was seen from, both divided by the larger reach. Matches are not looked at. The published weights know
-    objects that are turned by less than 45 degrees about each axis.
+    Uses a random sample of the levels' points (of the size in its configuration), each cloud centred at its viewpoint,
+    both divided by the larger radius. Matches are not used. The published weights are for objects rotated by less than
+    45 degrees about each axis.
 
     Parameters
     ----------
     points : int or None
-        Points of each cloud that are looked at; None takes the configuration's. Cost is proportional to it.
+        Points of each cloud that are used; None takes the configuration's. Cost is proportional to it.
     """
 
     points: int | None = None
@@ -55,9 +55,7 @@ class OmNet(NetworkStage):
         levels = (scene.target, scene.source)
         points = self.points or network.config.points
         if any(len(level) > points for level in levels):
-            scene.note(
-                f"OMNet looked at {points} of {len(levels[1])} source and {len(levels[0])} target points"
-            )
+            scene.note(f"OMNet used {points} of {len(levels[1])} source and {len(levels[0])} target points")
         batch, units = make_batch(
             levels[0].points,
             levels[1].points,
@@ -66,7 +64,7 @@ class OmNet(NetworkStage):
             centres=(levels[0].centre, levels[1].centre),
             device=self.device,
         )
-        require_bytes(network.memory(batch), (points, points), self.device, "look at fewer with points=...")
+        require_bytes(network.memory(batch), (points, points), self.device, "use fewer with points=...")
         with torch.inference_mode():
             found = array(network(batch).transform)[0]
         if not np.isfinite(found).all():

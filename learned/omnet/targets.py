@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The true poses of a batch, and which points overlap under them: for training only."""
+"""Training targets: the true poses of a batch, and which points overlap under them."""
 
 from __future__ import annotations
 
@@ -34,14 +34,14 @@ def compute_targets(transforms: Tensor) -> OmnetTargets:
 def overlap_labels(
     source: Tensor, target: Tensor, masks: tuple[Tensor, Tensor] | None, transform: Tensor, distance: float
 ) -> tuple[Tensor, Tensor]:
-    """Which points have a partner nearer than a distance under the true pose.
+    """Which points have a correspondence nearer than a distance under the true pose.
 
     Parameters
     ----------
     source, target
-        (B, N, 3), (B, M, 3) as they came, not as the network moved them.
+        (B, N, 3), (B, M, 3) the input clouds, not moved by the network.
     masks
-        (B, N), (B, M) bool: points left out have no partner and are nobody's; None for all points.
+        (B, N), (B, M) bool: points left out neither have nor are correspondences; None for all points.
     transform
         (B, 3, 4) true pose.
 

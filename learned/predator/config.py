@@ -12,7 +12,9 @@ from hybridreg.config import limits
 from hybridreg.config.plain_values import build
 from hybridreg.learned.kpfcnn.kpfcnn_config import KpfcnnConfig, architecture
 
-_WIDEST, _MOST_BLOCKS = 8192, 64
+# A configuration may come with untrusted weights: absurd sizes are refused before memory is allocated. By hand.
+_WIDEST = 8192  # channels
+_MOST_BLOCKS = 64
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -55,7 +57,7 @@ class PredatorLossConfig:
     max_points: int = 512  # pairs drawn for the circle loss
     circle_weight: float = 1.0
     overlap_weight: float = 1.0
-    saliency_weight: float | None = None  # None switches it, see `hybridreg.learned.predator.losses`
+    saliency_weight: float | None = None  # None: switched, see `hybridreg.learned.predator.losses`
 
     def __post_init__(self) -> None:
         limits.within(
@@ -77,7 +79,7 @@ class PredatorConfig:
     backbone: KpfcnnConfig = field(default_factory=KpfcnnConfig)
     graph: GraphConfig = field(default_factory=GraphConfig)
     final_dim: int = 32  # of the features
-    cross_score: bool = True  # the decoder also sees the other cloud's overlap scores, weighed by likeness
+    cross_score: bool = True  # the decoder also sees the other cloud's overlap scores, weighted by similarity
     condition_feature: bool = True  # the decoder sees the features after the graph blocks, not those before
     temperature_floor: float = 0.03
     loss: PredatorLossConfig = field(default_factory=PredatorLossConfig)
@@ -97,7 +99,7 @@ class PredatorConfig:
 
     @property
     def image(self) -> None:
-        """It looks at no image."""
+        """It uses no image."""
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values that `from_dict` and JSON take back."""

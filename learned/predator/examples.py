@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What a training step of Predator looks at."""
+"""Training examples of Predator."""
 
 from __future__ import annotations
 

@@ -17,9 +17,9 @@ _SLOPE = 0.2
 
 
 def nearest_others(points: Tensor, count: int) -> Tensor:
-    """(n, k) int64: the ``count`` points nearest to each of (n, 3), itself left out.
+    """(n, k) int64: the ``count`` points nearest to each of (n, 3), without itself.
 
-    A cloud of fewer points than ``count + 1``, with which the published code stops, gives as many as there are; a
+    A cloud of fewer than ``count + 1`` points, with which the published code fails, gives as many as there are; a
     single point is its own neighbour.
     """
     if len(points) == 1:
@@ -29,10 +29,10 @@ def nearest_others(points: Tensor, count: int) -> Tensor:
 
 
 class EdgeConvolution(nn.Module):
-    """Largest of a linear layer on [centre, neighbour - centre] over the neighbours, normalised, with a LeakyReLU.
+    """Maximum over the neighbours of a linear layer on [centre, neighbour - centre], normalised, with a LeakyReLU.
 
     The layer is applied to the points before their features are gathered: k times fewer products. Normalisation and
-    LeakyReLU grow with their input, so they follow the maximum; the statistics are of all edges all the same.
+    LeakyReLU are monotonic, so they follow the maximum; the statistics are still those of all edges.
     """
 
     def __init__(self, dim_in: int, dim_out: int) -> None:

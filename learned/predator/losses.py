@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Predator's three losses, and how good the answers are (lib/loss.py)."""
+"""Predator's three losses, and the quality of its features (lib/loss.py; docs/methods.md 11.2)."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from hybridreg.learned.matching.procrustes import apply_transform
 from hybridreg.learned.predator.config import PredatorLossConfig
 from hybridreg.learned.predator.targets import PredatorTargets
 
-# Squared distances below are cut, and their gradient with them.
+# Squared distances are clamped to at least this, which also removes their gradient.
 _NEAREST = 1e-12
 _RECALL = 0.3
 
 
 class ScoredPoints(Protocol):
-    """One cloud as the losses look at it."""
+    """One cloud, as the losses use it."""
 
     @property
     def points(self) -> Tensor:
@@ -53,7 +53,7 @@ class Classification:
 
 @dataclass(frozen=True, kw_only=True)
 class PredatorLosses:
-    """The parts of the training loss, and what they are of."""
+    """The parts of the training loss, and their inputs."""
 
     circle: Tensor
     overlap: Classification  # over all points, source first
@@ -69,7 +69,7 @@ class PredatorLosses:
 
     @property
     def parts(self) -> dict[str, Tensor]:
-        """Before they are weighed, for the log."""
+        """Before weighting, for the log."""
         return {"circle": self.circle, "overlap": self.overlap.loss, "saliency": self.saliency.loss}
 
     @property
@@ -78,18 +78,18 @@ class PredatorLosses:
         return self.recall
 
     def weighed(self, saliency_weight: float) -> Tensor:
-        """The sum with a weight of the saliency loss, as `saliency_weight` finds it."""
+        """The weighted sum, with a weight of the saliency loss from `saliency_weight`."""
         total = self.config.circle_weight * self.circle + self.config.overlap_weight * self.overlap.loss
-        # Not times 0: a loss that is not wanted must not spoil the others where it is not finite.
+        # Not times 0: an unused loss that is not finite must not spoil the others.
         return total + saliency_weight * self.saliency.loss if saliency_weight else total
 
 
 def saliency_weight(recall: float) -> float:
     """Weight of the saliency loss, by a recall (lib/trainer.py).
 
-    It is switched, not faded in: 0 up to a recall of 0.3, 1 above, and 0 again if the recall falls. Published is the
-    validation's recall of the epoch before; `PredatorLosses.total` goes by the step's own, so that a resumed run needs
-    to remember nothing.
+    It is switched, not faded in: 0 up to a recall of 0.3, 1 above, and 0 again if the recall falls. The original uses
+    the validation recall of the previous epoch; `PredatorLosses.total` uses the step's own, so that a resumed run
+    needs no state.
     """
     return 1.0 if recall > _RECALL else 0.0
 
@@ -133,7 +133,7 @@ def matchable(
     rows: tuple[Tensor, Tensor],
     config: PredatorLossConfig,
 ) -> tuple[Tensor, Tensor]:
-    """Which points in the overlap have their best match, by features as they are now, within the matchability radius.
+    """Which points in the overlap have their best match, by the current features, within the matchability radius.
 
     Parameters
     ----------
@@ -175,7 +175,7 @@ def _marked(count: int, rows: Tensor) -> Tensor:
 
 
 def _classify(scores: Tensor, labels: Tensor) -> Classification:
-    # Each label is weighed by the other's share, and the weights are not normalised: where nearly all labels are one,
+    # Each class is weighted by the other's share, and the weights are not normalised: where nearly all labels are one,
     # the loss is small.
     wanted = labels.to(scores.dtype)
     if len(labels) == 0:

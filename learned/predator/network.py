@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Predator (Huang et al. 2021): where do two clouds overlap, which points are worth matching, and by which features?"""
+"""Predator (Huang et al. 2021): overlap, saliency and features of the points of two clouds."""
 
 from __future__ import annotations
 
@@ -28,12 +28,12 @@ from hybridreg.learned.weights import load_official_tensors
 
 @dataclass(frozen=True, kw_only=True)
 class PredatorCloud:
-    """One cloud's points of the first stage, and what the network says about each."""
+    """One cloud's points of the first stage, and the network's output for each."""
 
     points: Tensor  # (N, 3) metres
     features: Tensor  # (N, final_dim), length one
-    overlap: Tensor  # (N,) in [0, 1]: does the other cloud show this place?
-    saliency: Tensor  # (N,) in [0, 1]: would its best match in the overlap be right?
+    overlap: Tensor  # (N,) in [0, 1]: probability of lying in the overlap
+    saliency: Tensor  # (N,) in [0, 1]: probability that its best match in the overlap is correct
 
     @property
     def sampling(self) -> Tensor:
@@ -52,7 +52,7 @@ class PredatorOutput:
 
 
 class PredatorNetwork(Pretrained):
-    """Features, overlap and saliency of both clouds' points. No part of it takes a ground truth.
+    """Features, overlap and saliency of both clouds' points. No part of it takes the ground truth.
 
     Exchanging source and target changes the numbers: the source attends first. Evaluation and training mode compute
     the same.
@@ -62,7 +62,7 @@ class PredatorNetwork(Pretrained):
     config
         The network; ``named_config`` has the published ones.
     seed
-        Fixes how the kernel points are turned. The weights follow torch's generator.
+        Fixes the rotation of the kernel points. The weights follow torch's generator.
     """
 
     name: ClassVar[str] = "predator"
@@ -83,11 +83,11 @@ class PredatorNetwork(Pretrained):
         self.project = nn.Linear(dim, dim)
         self.score = nn.Linear(dim, 1)
         self.decoder = KpfcnnDecoder(config.backbone, config.decoder_dim, config.final_dim + 2)
-        nn.init.zeros_(self.score.bias)  # by which `untrained` tells
+        nn.init.zeros_(self.score.bias)  # by which `untrained` recognises it
 
     @classmethod
     def seeded(cls, config: PredatorConfig, seed: int) -> PredatorNetwork:
-        """A network of random weights; the seed turns the kernel points."""
+        """A network with random weights; the seed rotates the kernel points."""
         return cls(config, seed)
 
     def forward(self, batch: Batch) -> PredatorOutput:
@@ -115,7 +115,7 @@ class PredatorNetwork(Pretrained):
         return torch.cat(parts, 1)
 
     def cross_score(self, features: Tensor, score: Tensor, pyramid: Pyramid) -> Tensor:
-        """Mean (n + m, 1) of the other cloud's raw scores, weighed by how alike its superpoints are."""
+        """Mean (n + m, 1) of the other cloud's raw scores, weighted by the similarity of its superpoints."""
         lengths = list(pyramid.lengths[-1])
         target, source = F.normalize(features, dim=1).split(lengths)
         of_target, of_source = score.split(lengths)
@@ -140,11 +140,11 @@ class PredatorNetwork(Pretrained):
         return PredatorOutput(target=target, source=source)
 
     def losses(self, output: PredatorOutput, targets: PredatorTargets) -> PredatorLosses:
-        """The three losses of a pair, and how good the answers are."""
+        """The three losses of a pair, and the quality of its features."""
         return predator_losses((output.target, output.source), targets, self.config.loss)
 
     def memory(self, batch: Batch) -> int:
-        """Predicted peak of a forward pass in bytes, beside what the process and the batch hold already."""
+        """Predicted peak of a forward pass in bytes, on top of what the process and the batch already hold."""
         counts, dim = batch.pyramid.lengths[-1], self.config.graph.dim
         edges = max(counts) * (self.config.graph.neighbors + 1) * 2 * dim * 3 * 4
         attention = counts[0] * counts[1] * (self.config.graph.heads + 3) * 2 * 4
@@ -152,7 +152,7 @@ class PredatorNetwork(Pretrained):
         return encoder_bytes(batch.pyramid, self.config.backbone, max(edges, attention, distances))
 
     def untrained(self) -> frozenset[str]:
-        """All parts where no training step has touched the network: it has no normalisation weights to tell."""
+        """All parts where no training step has touched the network: it has no normalisation weights to show it."""
         made = bool((self.score.bias == 0).all())
         return frozenset(name for name, _ in self.named_children()) if made else frozenset()
 
@@ -168,8 +168,8 @@ class PredatorNetwork(Pretrained):
             A ``.pth`` as published, or a bare state dict saved by ``torch.save``. Read with ``weights_only``.
         size
             A configuration or its name; by default ``predator-kitti`` or ``predator-3dmatch``, whichever has the
-            search radius that the kernel points tell. Weights older than June 2021 fit in shape but were trained with
-            a fault that is mended (its issue 15): they match less well here.
+            search radius of the kernel points. Weights older than June 2021 fit in shape but were trained with a bug
+            that was later fixed (its issue 15): they match less well here.
 
         Raises
         ------

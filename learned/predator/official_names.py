@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""How our tensors are called in Predator's published checkpoints, and which configuration a checkpoint is of."""
+"""Names of our tensors in Predator's published checkpoints, and a checkpoint's configuration."""
 
 from __future__ import annotations
 

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-# An overlap that leaves fewer points than this is taken to be wrong, and ignored.
+# An overlap mask that leaves fewer points than this is considered wrong, and ignored.
 _FEWEST = 100
 
 
@@ -27,7 +27,7 @@ class _PredatorStage(StackedStage):
     kind: ClassVar[str] = "predator"
 
     def output(self, scene: Scene) -> PredatorOutput:
-        """What the network says about a pair: computed once a run for all stages of the same network."""
+        """The network's output for a pair: computed once a run for all stages of the same network."""
         self.note_random(scene)
         return scene.shared(("output", self.network_name()), lambda: self._run(scene))
 
@@ -41,7 +41,7 @@ class _PredatorStage(StackedStage):
 
 @dataclass(frozen=True, kw_only=True)
 class PredatorOverlap(_PredatorStage):
-    """Which points does the other cloud share, as Predator sees it (Huang et al. 2021).
+    """Overlap probabilities of the points by Predator (Huang et al. 2021).
 
     Each point takes the score of the nearest point on the network's grid. A matcher of the same weights shares the
     computation.
@@ -61,19 +61,19 @@ class PredatorOverlap(_PredatorStage):
 
 @dataclass(frozen=True, kw_only=True)
 class Predator(_PredatorStage):
-    """Points worth matching, paired by the nearest of their features (Huang et al. 2021).
+    """Salient points in the overlap, matched by nearest features (Huang et al. 2021).
 
-    Points are drawn by the product of overlap and saliency, without replacement, then each of the source's goes with
-    the nearest of the target's. An overlap stage before it takes the place of the network's own overlap scores.
+    Points are drawn by the product of overlap and saliency, without replacement, then each of the source's is matched
+    to the nearest of the target's. An overlap stage before it replaces the network's own overlap scores.
 
     Parameters
     ----------
     points : int
-        At most so many are drawn a cloud; 5000 as published.
+        At most this many are drawn per cloud; 5000 as published.
     mutual : bool
         Keep only pairs that are each other's nearest. Published results come from all of them.
     seed : int
-        Of the draw.
+        Of the random sampling.
     """
 
     points: int = 5000
@@ -111,11 +111,11 @@ class Predator(_PredatorStage):
         from hybridreg.learned.stages.tensor_values import array
 
         own, saliency, points = array(cloud.overlap), array(cloud.saliency), array(cloud.points)
-        # A mask that is one everywhere says nothing.
+        # A mask that is one everywhere has no information.
         weight = own if bool((given == 1.0).all()) else gather(given, level.points, points)
         rows = draw(weight * saliency, self.points, self.seed + number)
         if len(rows) >= min(_FEWEST, len(points), self.points):
             return rows
-        # Scores of zero everywhere: all points are as good.
+        # Scores of zero everywhere: all points are equally good.
         rows = draw(own * saliency, self.points, self.seed + number)
         return rows if len(rows) else draw(np.ones(len(points)), self.points, self.seed + number)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Which points of a pair are the same place, from the true pose, and what a step draws: for training only."""
+"""Training targets: corresponding points of a pair under the true pose, and the sample of a step."""
 
 from __future__ import annotations
 
@@ -33,10 +33,10 @@ class PredatorTargets:
 def compute_targets(
     pyramid: Pyramid, transform: Tensor, config: PredatorConfig, generator: torch.Generator
 ) -> PredatorTargets:
-    """All true pairs of points, and one draw of those that the circle loss looks at.
+    """All true point pairs, and one sample of them for the circle loss.
 
     The published training drops pairs of clouds with fewer than ``max_points`` true pairs; here they give what they
-    have, none at all included.
+    have, even none.
 
     Parameters
     ----------

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Voxel-grid subsampling on tensors: the centroid of the points of each cell."""
+"""Voxel-grid subsampling of tensors: the centroid of the points of each cell."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What each point of the first stage brings along: a constant, or four numbers about its surroundings."""
+"""Input features of the first stage's points: a constant, or four numbers on their neighbourhood."""
 
 from __future__ import annotations
 

@@ -23,14 +23,14 @@ def radius_neighbors(
     radius
         Metres.
     limit
-        Columns of the answer; farther neighbours are cut off.
+        Columns of the result; farther neighbours are dropped.
     workers
         Threads of the tree search on the CPU.
 
     Returns
     -------
     Tensor
-        (N, limit) int64; missing neighbours hold M, the shadow index.
+        (N, limit) int64; missing neighbours are M, the padding index.
     """
     if queries.is_cuda:
         return _radius_neighbors_tensor(queries, supports, radius, limit)
@@ -44,7 +44,7 @@ def _radius_neighbors_tensor(queries: Tensor, supports: Tensor, radius: float, l
     k = min(limit, n_supports)
     found = []
     for block in queries.split(max(1, _CHUNK_PAIRS // n_supports)):
-        # The exact differences, not the expanded square: at 100 m that would be wrong by centimetres.
+        # The exact differences, not the expanded square, which at 100 m would be off by centimetres.
         distance = torch.cdist(block, supports, compute_mode="donot_use_mm_for_euclid_dist")
         nearest, index = distance.topk(k, largest=False)
         found.append(torch.where(nearest < radius, index, n_supports))
@@ -52,7 +52,7 @@ def _radius_neighbors_tensor(queries: Tensor, supports: Tensor, radius: float, l
 
 
 def nearest_neighbor(queries: Tensor, supports: Tensor) -> Tensor:
-    """Index (N,) int64 of the nearest support of each query, however far."""
+    """Index (N,) int64 of the nearest support of each query, at any distance."""
     if not queries.is_cuda:
         _, index = cKDTree(supports.numpy().astype(np.float64)).query(queries.numpy())
         return torch.from_numpy(np.asarray(index, dtype=np.int64))

@@ -33,7 +33,7 @@ def build_patches(
 ) -> Patches:
     """Assign fine points (N, 3) to superpoints (n, 3) and keep at most ``limit`` of each.
 
-    ``rule`` says which, and in which order: the nearest ones, nearest first, or the first ones as they are numbered.
+    ``rule`` says which, and in which order: the nearest ones, nearest first, or the first ones by index.
     """
     limit = min(limit, len(points))
     distance, owner = _assign(points, nodes)

@@ -14,7 +14,7 @@ from hybridreg.learned.pyramid.neighbors import count_neighbors, nearest_neighbo
 
 
 class PyramidPlan(Protocol):
-    """What a backbone's configuration tells of its pyramid."""
+    """What a pyramid needs of a backbone's configuration."""
 
     @property
     def stages(self) -> int:
@@ -131,7 +131,7 @@ def _stack(clouds: list[tuple[Tensor, Tensor]], radius: float, limit: int) -> Te
 
 
 def _stack_nearest(clouds: list[tuple[Tensor, Tensor]]) -> Tensor:
-    # Unconditional: equal to the reference's radius search whenever that finds anything, and never a shadow.
+    # Unconditional: equal to the original's radius search whenever that finds anything, and never padding.
     blocks, offset = [], 0
     for queries, supports in clouds:
         blocks.append(nearest_neighbor(queries, supports) + offset)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Training recipes by name: TOML files beside this one."""
+"""Training recipes by name: TOML files next to this one."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def find(name: str) -> Path:
     Raises
     ------
     FileNotFoundError
-        Neither is there.
+        Neither exists.
     """
     for file in (Path(name), Path(str(files(__name__).joinpath(f"{name}.toml")))):
         if file.is_file():

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What RoITr takes: both clouds at every level, with normals. No truth."""
+"""The input of RoITr: both clouds at every level, with normals. No ground truth."""
 
 from __future__ import annotations
 
@@ -44,15 +44,15 @@ def make_batch(
         Of the network that will take the batch.
     viewpoints
         Where target and source were seen from: (3,), (k, 3), or None where that is not known (normals then look
-        upwards). Read where ``config.facing`` is "sensor"; otherwise, and by default, normals face each frame's
-        origin, as the original has it (dataset/tdmatch.py).
+        upwards). Used where ``config.facing`` is "sensor"; otherwise, and by default, normals face each frame's
+        origin, as in the original (dataset/tdmatch.py).
     device
-        Where the tensors end up; the levels are built on the CPU.
+        Where the tensors are placed; the levels are built on the CPU.
 
     Raises
     ------
     ValueError
-        A cloud of fewer than 4 points, or one that holds values that are not finite.
+        A cloud of fewer than 4 points, or with values that are not finite.
     """
     origins = (np.zeros(3), np.zeros(3))
     places = origins if viewpoints is None or config.facing == "origin" else viewpoints
@@ -81,7 +81,7 @@ def _levels(
 def oriented_normals(
     points: npt.NDArray[np.float64], place: npt.NDArray[np.floating] | None, k: int
 ) -> npt.NDArray[np.float64]:
-    """Unit normals (N, 3) that face the sensor; where a neighbourhood gives none, the ray to the sensor stands in."""
+    """Unit normals (N, 3) that face the sensor; where a neighbourhood gives none, the ray to the sensor is used."""
     normals = estimate(points, None if place is None else np.asarray(place, dtype=np.float64), k)
     none = ~(np.linalg.norm(normals, axis=1) > 0.5)  # not below: NaN counts as none too
     if none.any():

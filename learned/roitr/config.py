@@ -12,7 +12,10 @@ from hybridreg.config import limits
 from hybridreg.config.plain_values import build
 from hybridreg.learned.cross3dreg.config import LossConfig, MatchingConfig, TransformerConfig
 
-_WIDEST, _MOST_NEIGHBORS, _MOST_BLOCKS = 4096, 512, 64
+# A configuration may come with untrusted weights: absurd sizes are refused before memory is allocated. By hand.
+_WIDEST = 4096  # channels
+_MOST_NEIGHBORS = 512  # of a point
+_MOST_BLOCKS = 64
 
 
 def _transformer() -> TransformerConfig:
@@ -41,10 +44,10 @@ class RoitrConfig:
     decoder_heads: int = 4
     interpolation: int = 3  # coarser points that a finer one is interpolated from
     normal_neighbors: int = 33  # the point itself counted
-    # Where normals look: at the origin of each cloud's frame, as released and as the published weights expect, wherever
-    # the sensor stood; or at the sensor, and upwards where its place is not known.
+    # Orientation of normals: towards the origin of each cloud's frame, as released and as the published weights
+    # expect, wherever the sensor stood; or towards the sensor, and upwards where its viewpoint is not known.
     facing: Literal["origin", "sensor"] = "origin"
-    max_points: int = 30_000  # of a cloud; more are thinned to so many
+    max_points: int = 30_000  # of a cloud; more are sampled down to this number
     fine_dim: int = 256  # width of the features that points are matched by
     transformer: TransformerConfig = field(default_factory=_transformer)
     matching: MatchingConfig = field(default_factory=_matching)
@@ -55,7 +58,7 @@ class RoitrConfig:
     loss: LossConfig = field(default_factory=_loss)
     coarse_weight: float = 1.0
     fine_weight: float = 1.0
-    target_overlap: float = 0.1  # superpoint pairs that a training step may draw overlap by more
+    target_overlap: float = 0.1  # training pairs overlap by more than this
     occlusion_radius: float = 0.0375  # metres
 
     def __post_init__(self) -> None:

@@ -19,7 +19,7 @@ _EPS = 1e-8  # metres; keeps the inverse distance finite where two levels share 
 
 @dataclass(frozen=True)
 class LevelFeatures:
-    """What the point-pair features of a cloud are, made once for all blocks and for the decoder."""
+    """Point-pair features of a cloud, computed once for all blocks and for the decoder."""
 
     within: tuple[Tensor, ...]  # (N_l, k, 4)
     down: tuple[Tensor, ...]  # (N_l, k, 4), for l > 0
@@ -95,7 +95,8 @@ class DecoderLevel(nn.Module):
 
 
 class RoitrBackbone(nn.Module):
-    """Features of one cloud. The decoder sees the encoder's features alone: fine features know no other cloud."""
+    """Features of one cloud. The decoder sees only the encoder's features: fine features do not depend on the other
+    cloud."""
 
     def __init__(self, config: RoitrConfig) -> None:
         super().__init__()

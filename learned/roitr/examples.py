@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What a training step of RoITr looks at."""
+"""Training examples of RoITr."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from hybridreg.learned.true_pair import TruePair, torch_generator
 
 
 def example(pair: TruePair, config: RoitrConfig, rng: np.random.Generator) -> tuple[RoitrBatch, RoitrTargets]:
-    """Normals and levels of a pair on the network's grid, and one draw of true pairs of superpoints.
+    """Normals and levels of a pair on the network's grid, and one sample of true superpoint pairs.
 
     Raises
     ------

@@ -14,7 +14,7 @@ from hybridreg.learned.layers.attention import Attention, FeedForward, merge_hea
 
 
 class TwoBranchAttention(Attention):
-    """Geometric attention whose scores serve twice: for the features, and without the diagonal for positions."""
+    """Geometric attention whose scores are used twice: for the features, and without the diagonal for positions."""
 
     def __init__(self, dim: int, heads: int) -> None:
         super().__init__(dim, heads, geometric=True)
@@ -36,7 +36,7 @@ class TwoBranchAttention(Attention):
 
     def _others(self, scores: Tensor) -> Tensor:
         n = scores.shape[1]
-        if n == 1:  # nobody else is there
+        if n == 1:  # there is no other point
             return torch.softmax(scores, dim=-1)
         itself = torch.eye(n, dtype=torch.bool, device=scores.device)
         return torch.softmax(scores.masked_fill(itself, -math.inf), dim=-1)
@@ -110,7 +110,7 @@ class GlobalTransformer(nn.Module):
                 target, target_positions = layer(target, structures[1])
                 positions = source_positions, target_positions
             else:
-                # In this order: the target sees the source that has already seen the target.
+                # In this order: the target attends to the source that has already attended to the target.
                 source = layer(source, positions[0], target, positions[1])
                 target = layer(target, positions[1], source, positions[0])
         return self.out(source), self.out(target)

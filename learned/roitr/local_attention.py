@@ -2,9 +2,9 @@
 """Attention of a point to its neighbours, with their point-pair features in the scores and in the values.
 
 The position code is ``E ppf + e``, and the attention projects it by ``p`` for the scores and by ``vp`` for the values;
-nothing stands between the two linear maps. Multiplied first, they are one map from 4 numbers to C, and as both the
-product with the query and the weighted sum over the neighbours are linear too, no tensor of (neighbours, C) is made:
-the queries go down to 4 numbers a head, and the weighted sum of 4 numbers goes up to C.
+there is nothing between the two linear maps. Multiplied first, they are one map from 4 numbers to C, and as both the
+product with the query and the weighted sum over the neighbours are linear too, no tensor of (neighbours, C) is needed:
+queries are projected down to 4 numbers a head, and the weighted sum of 4 numbers up to C.
 """
 
 from __future__ import annotations
@@ -28,8 +28,8 @@ class LocalAttention(nn.Module):
     heads
         Of the attention; divides ``dim``.
     fused
-        Multiply the position codes' linear maps first. False computes code by code as the original does: for the
-        comparison of both, the result is the same up to rounding.
+        Multiply the position codes' linear maps first. False computes each code as the original does, for comparison:
+        the result is the same up to rounding.
     """
 
     def __init__(self, in_dim: int, dim: int, out_dim: int, heads: int, *, fused: bool = True) -> None:
@@ -59,7 +59,7 @@ class LocalAttention(nn.Module):
         own = projected if centres is None else projected[centres]
         weights = self.weights(projected, own, neighbors, ppf)
         value = F.embedding(neighbors, self.value(projected)).unflatten(2, (self.heads, -1))  # (n, k, h, c)
-        # Products and sums as they lie: einsum would copy the gathered tensors first, for half the speed.
+        # Products and sums without reordering: einsum would copy the gathered tensors first, at half the speed.
         attended = (weights.transpose(1, 2)[..., None] * value).sum(1) + self._position_values(weights, ppf)
         # The residual is the projected feature, not the layer's input.
         return self.out_proj(self.norm(self.linear(attended.flatten(1)) + own))
@@ -85,7 +85,7 @@ class LocalAttention(nn.Module):
             code = self.position_value(self.code(ppf)).unflatten(2, (self.heads, -1))
             return torch.einsum("nhk,nkhc->nhc", weights, code)
         weight, bias = self._together(self.position_value)
-        # The weights of a point sum to one, so the bias goes through as it is.
+        # The weights of a point sum to one, so the bias is unchanged.
         return torch.einsum("nhp,hcp->nhc", weights @ ppf, weight) + bias
 
     def _together(self, layer: nn.Linear) -> tuple[Tensor, Tensor]:

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""RoITr's losses: circle loss on superpoints, negative log-likelihood of the true point assignment."""
+"""RoITr's losses: circle loss on superpoints, negative log-likelihood of the true point assignment (docs/methods.md
+11.5)."""
 
 from __future__ import annotations
 
@@ -28,19 +29,19 @@ class RoitrLosses:
 
     @property
     def parts(self) -> dict[str, Tensor]:
-        """Before they are weighed, for the log."""
+        """Before weighting, for the log."""
         return {"coarse": self.coarse, "fine": self.fine}
 
     @property
     def hits(self) -> Tensor | None:
-        """They do not tell."""
+        """Not available."""
         return None
 
 
 def losses(network: RoitrNetwork, output: RoitrOutput | RoitrEncoding, targets: RoitrTargets) -> RoitrLosses:
-    """Losses of a training step: the fine part looks at the drawn true pairs of patches (lib/loss.py).
+    """Losses of a training step: the fine part uses the drawn true patch pairs (lib/loss.py).
 
-    The original's validation looks at the estimated pairs instead (`validation_losses`): the two fine losses cannot be
+    The original's validation uses the estimated pairs instead (`validation_losses`): the two fine losses cannot be
     compared.
     """
     pairs = targets.target[targets.drawn], targets.source[targets.drawn]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""How much memory RoITr's forward pass will take, told before it runs."""
+"""Memory estimate of RoITr's forward pass before it runs."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ _GATHERED = 3  # of (neighbours, C) tensors alive at a time: keys or values, the
 
 
 def forward_bytes(batch: RoitrBatch, config: RoitrConfig) -> int:
-    """Estimated peak in bytes, beside what the process and the batch hold already."""
+    """Estimated peak in bytes, on top of what the process and the batch already hold."""
     clouds = (batch.target, batch.source)
     local = max(_level_bytes(cloud, level, config) for cloud in clouds for level in range(config.levels))
     kept = sum(

@@ -43,7 +43,7 @@ class RoitrEncoding(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True)
 class RoitrOutput:
-    """What a forward pass gives. ``node_features`` of both clouds hold unit vectors."""
+    """What a forward pass gives. ``node_features`` of both clouds are unit vectors."""
 
     target: CloudEncoding
     source: CloudEncoding
@@ -52,7 +52,7 @@ class RoitrOutput:
 
 
 class RoitrNetwork(Pretrained):
-    """The whole network (model/RIGA_v2.py). No part of it takes a ground truth.
+    """The whole network (model/RIGA_v2.py). No part of it takes the ground truth.
 
     Parameters
     ----------
@@ -116,15 +116,15 @@ class RoitrNetwork(Pretrained):
         return RoitrOutput(target=target, source=source, superpoints=superpoints, matches=matches)
 
     def losses(self, output: RoitrOutput | RoitrEncoding, targets: RoitrTargets) -> RoitrLosses:
-        """The training losses of an output, or of `encode`'s: the matches take no part in them."""
+        """The training losses of an output, or of `encode`'s: the matches are not needed for them."""
         return losses(self, output, targets)
 
     def memory(self, batch: RoitrBatch) -> int:
-        """Predicted peak of a forward pass in bytes, beside what the process and the batch hold already."""
+        """Predicted peak of a forward pass in bytes, on top of what the process and the batch already hold."""
         return forward_bytes(batch, self.config)
 
     def training_output(self, batch: RoitrBatch) -> RoitrEncoding:
-        """`encode` alone: no match takes part in the losses."""
+        """`encode` alone: matches are not needed for the losses."""
         return self.encode(batch)
 
     def encode(self, batch: RoitrBatch) -> RoitrEncoding:

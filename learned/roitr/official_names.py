@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""How our tensors are called in RoITr's published checkpoints, and what these hold beside them."""
+"""Names of our tensors in RoITr's published checkpoints, and what else these contain."""
 
 from __future__ import annotations
 
@@ -58,7 +58,8 @@ def official_name(name: str) -> str:
 
 
 def unused_names(ours: Iterable[str]) -> list[str]:
-    """What a checkpoint holds and the original's forward pass never reads, for a network with our tensors ``ours``."""
+    """What a checkpoint contains and the original's forward pass never reads, for a network with our tensors
+    ``ours``."""
     codes = [official_name(name) for name in ours if name.endswith(".code.weight")]
     sines = [name.replace(".embedding.proj.weight", ".embedding.embedding.div_term") for name in codes]
     return [*sines, "OT.alpha", "backbone.occ_proj.weight", "backbone.occ_proj.bias"]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Point-pair features: what two points with normals look like to one another, whatever way they are turned."""
+"""Point-pair features: rotation-invariant descriptions of two points with normals."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The levels of one cloud: farthest points, their neighbours, and the ways up and down between levels."""
+"""The levels of one cloud: farthest points, their neighbours, and the links between levels."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ Rows = NDArray[np.int64]
 class Levels:
     """One cloud at every level, the finest first. Level l has N_l points; indices are int64.
 
-    Built on the CPU whatever the device: farthest points are picked one after another, and equal picks on every
+    Built on the CPU whatever the device: farthest points are chosen one after another, and equal choices on every
     device are worth more than the milliseconds.
     """
 
@@ -42,7 +42,7 @@ class Levels:
 
 
 def build_levels(points: Points, normals: Points, config: RoitrConfig) -> Levels:
-    """Levels of a cloud (N, 3) with its normals (N, 3): each keeps a share of the points, picked, never averaged."""
+    """Levels of a cloud (N, 3) with its normals (N, 3): each keeps a share of the points, selected, never averaged."""
     clouds, directions = [points], [normals]
     picked, down = [], []
     trees = [cKDTree(points)]
@@ -73,7 +73,7 @@ def build_levels(points: Points, normals: Points, config: RoitrConfig) -> Levels
 
 
 def farthest_points(points: Points, count: int) -> Rows:
-    """``count`` rows of (N, 3), each the farthest from those before it; row 0 first, the first of equals."""
+    """``count`` rows of (N, 3), each the farthest from those before it; row 0 first, ties to the first."""
     columns = np.ascontiguousarray(points.T)  # (3, N)
     rows = np.zeros(count, dtype=np.int64)
     best = np.full(len(points), np.inf, dtype=np.float32)
@@ -88,15 +88,15 @@ def farthest_points(points: Points, count: int) -> Rows:
 def nearest_others(tree: cKDTree, rows: Rows, k: int) -> Rows:
     """The k nearest other points (n, k) of a tree's own points ``rows`` (n,); fewer columns where it has fewer.
 
-    The original drops the nearest answer, which is a twin where a point lies twice; here it is the point itself. A
-    point that is alone is its own neighbour.
+    The original drops the nearest result, which is a duplicate where a point occurs twice; here it is the point
+    itself. A single point is its own neighbour.
     """
     wanted = min(k, tree.n - 1)
     if wanted == 0:
         return rows[:, None].copy()
     found = _nearest(tree, tree.data[rows], wanted + 1)[1]
     other = found != rows[:, None]
-    other[other.all(axis=1), -1] = False  # more twins than were asked for: the point itself is not among them
+    other[other.all(axis=1), -1] = False  # more duplicates than requested: the point itself is not among them
     return found[other].reshape(len(rows), wanted)
 
 

@@ -22,16 +22,16 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-# A mask that leaves fewer superpoints than this is taken to be wrong, and ignored.
+# A mask that leaves fewer superpoints than this is considered wrong, and ignored.
 _FEWEST = 4
 
 
 @dataclass(frozen=True, kw_only=True)
 class Roitr(NetworkStage):
-    """Superpoints and points matched by features that no rotation changes (Yu et al., CVPR 2023).
+    """Superpoints and points matched by rotation-invariant features (Yu et al., CVPR 2023).
 
-    Needs oriented normals: they are estimated from 33 neighbours and turned to the frame's origin for the published
-    weights, as these expect, and for others to where each cloud was seen from (`RoitrConfig.facing`).
+    Needs oriented normals: they are estimated from 33 neighbours and oriented towards the frame's origin for the
+    published weights, as these expect, and for others towards each cloud's viewpoint (`RoitrConfig.facing`).
 
     Parameters
     ----------

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Superpoint matching with as many pairs as are alike, as RoITr does on 4DMatch."""
+"""Superpoint matching with an adaptive number of pairs, as RoITr does on 4DMatch."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def match_adaptively(target: Tensor, source: Tensor, least: int, farthest: float
     target, source
         (m, c), (n, c) features of length one.
     least
-        Where fewer pairs are near enough, the so many nearest, best first. Otherwise rows in order, not sorted.
+        Where fewer pairs are near enough, this many nearest ones, best first. Otherwise rows in order, not sorted.
     farthest
         Euclidean distance of two features.
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What RoITr should have found, from the true pose: for training only."""
+"""Training targets of RoITr from the true pose."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class RoitrTargets:
 def compute_targets(
     batch: RoitrBatch, transform: Tensor, config: RoitrConfig, generator: torch.Generator | None = None
 ) -> RoitrTargets:
-    """Overlaps of all superpoint pairs, and at most ``loss.targets`` of them with a large one, drawn at random.
+    """Overlaps of all superpoint pairs, and at most ``loss.targets`` random ones with a large overlap.
 
     Parameters
     ----------
@@ -45,7 +45,7 @@ def compute_targets(
     config
         ``matching.matching_radius``, ``matching.patch_points``, ``loss.targets`` and ``target_overlap`` are used.
     generator
-        Of the draw, on the CPU.
+        Of the random choice, on the CPU.
     """
     clouds = (batch.target, batch.source)
     transform = transform.to(clouds[0].points[0])
@@ -64,10 +64,10 @@ def compute_targets(
 def visible_shares(
     points: tuple[Tensor, Tensor], patches: tuple[Patches, Patches], transform: Tensor, radius: float
 ) -> tuple[Tensor, Tensor]:
-    """How much of each superpoint's patch the other cloud shows: shares (m,), (n,) in [0, 1].
+    """Share of each superpoint's patch that lies in the overlap: (m,), (n,) in [0, 1].
 
     The original computes them in every pass as targets of an occlusion loss that is always zero (lib/utils.py,
-    get_node_occlusion_score). Here they are for whoever looks at a pair; no loss reads them.
+    get_node_occlusion_score). Here they are only for inspection; no loss uses them.
     """
     moved = apply_transform(points[1], transform)
     near = (_has_near(points[0], moved, radius), _has_near(moved, points[0], radius))

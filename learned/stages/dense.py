@@ -14,10 +14,10 @@ from hybridreg.scene import Scene
 
 @dataclass(frozen=True, kw_only=True)
 class DenseFeatures(NetworkStage):
-    """Pair the fine points whose features are each other's nearest, as FCGF does (Choy et al. 2019).
+    """Match fine points whose features are mutual nearest neighbours (as in FCGF, Choy et al. 2019).
 
-    No transformer takes part: a backbone that the contrastive warm-up has trained (docs/methods.md 10.4) is enough,
-    and any estimator can go on from its matches. The weight of a match is the cosine of its features, at least 0.
+    Without a transformer: a backbone from the contrastive warm-up (docs/methods.md 10.4) suffices, and any estimator
+    can use its matches. The weight of a match is the cosine of its features, at least 0.
 
     Parameters
     ----------

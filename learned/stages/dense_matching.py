@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Points of two clouds paired by the nearest of their features: what the dense matchers have in common."""
+"""Nearest-neighbour matching of point features, shared by the dense matchers."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from hybridreg.scene import Scene
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
-# An overlap that leaves fewer points than this is taken to be wrong, and ignored.
+# An overlap mask that leaves fewer points than this is considered wrong, and ignored.
 _FEWEST = 100
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class DensePoints:
-    """Points (n, 3) of a cloud in metres, and their features (n, d) as they are compared."""
+    """Points (n, 3) of a cloud in metres, and their features (n, d) for the comparison."""
 
     points: Array
     features: Array
@@ -49,7 +49,7 @@ def match_dense(
     min_overlap
         Points with a lower probability of overlap are left out, unless too few would remain.
     mutual
-        Keep only pairs that are each other's nearest.
+        Keep only mutual nearest neighbours.
     spacing
         Of the points, metres.
     """
@@ -77,7 +77,7 @@ def match_points(
 
 
 def _rows(cloud: DensePoints, level: Array, probability: Array, min_overlap: float) -> Indices:
-    # A feature that is not finite (of length zero, normalised as published) is nearest to nothing.
+    # A feature that is not finite (of length zero, normalised as published) matches nothing.
     usable = np.isfinite(cloud.features).all(axis=1)
     rows = np.flatnonzero(usable & (gather(probability, level, cloud.points) > min_overlap))
     enough = len(rows) >= min(_FEWEST, len(cloud.points))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Rows drawn by weight, without replacement."""
+"""Weighted random sampling without replacement."""
 
 from __future__ import annotations
 
@@ -8,7 +8,8 @@ from numpy.typing import NDArray
 
 
 def draw(weight: NDArray[np.float64], count: int, seed: int) -> NDArray[np.int64]:
-    """At most ``count`` rows of positive weight (n,), ascending, each as likely to go first as its weight says.
+    """At most ``count`` rows of positive weight (n,), ascending, sampled with probabilities proportional to their
+    weights.
 
     All of them where there are no more than ``count`` (Efraimidis and Spirakis 2006: the smallest of exponential
     variables with the weights for rates).

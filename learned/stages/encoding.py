@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A pair as a network sees it, encoded once a run for all stages that use the same network."""
+"""Encoding of a pair by a network, computed once a run for all stages that use the same network."""
 
 from __future__ import annotations
 
@@ -30,9 +30,9 @@ def _encode(scene: Scene, stage: NetworkStage) -> Encoding:
     network: RegistrationNetwork = stage.network()
     if network.image_encoder is not None and not (stage.sees() and scene.pair.has_image):
         why = "no image" if not scene.pair.has_image else "the network was trained without images"
-        scene.note(f"{why}: features come from the clouds alone, a learned token in the image's place")
-    # Cylindrical kernel points take z for the vertical, and sensors may hang in any way. The ground tells which,
-    # unless a wall was taken for it: both are tried.
+        scene.note(f"{why}: features come from the clouds alone, with a learned token instead of the image")
+    # Cylindrical kernel points take z as the vertical, and sensors may be mounted in any orientation. The ground shows
+    # it, unless a wall was taken for the ground: both are tried.
     upright = Turns.upright(scene) if network.config.backbone.kernel == "cylindrical" else None
     with single(), torch.inference_mode():
         as_given = _encode_turned(scene, stage, Turns.none())
@@ -50,8 +50,8 @@ def _encode_turned(scene: Scene, stage: NetworkStage, turns: Turns) -> Encoding:
 
 
 def _batch(scene: Scene, stage: NetworkStage, turns: Turns) -> Batch:
-    # A network's filters have the size of the voxel that it was trained with. Levels of that voxel are taken as
-    # they are; others would show it a density that it never saw, so it makes its own from the clouds.
+    # A network's filters have the size of the voxel that it was trained with. Levels of that voxel are used directly;
+    # others have a density that it never saw, so it makes its own from the clouds.
     config = stage.network().config
     voxel = config.backbone.voxel
     ready = note_grid(scene, voxel)

@@ -16,14 +16,14 @@ if TYPE_CHECKING:
 class GeoTransformer(NetworkMatcher):
     """Superpoints matched by a geometric transformer, points by optimal transport (Qin et al. 2022).
 
-    Weights whose configuration says `self_attention="vanilla"` run without the geometric embedding. Weights with
-    an overlapping mask predictor fit too: it takes part through the overlap stage alone.
+    Weights whose configuration says `self_attention="vanilla"` run without the geometric embedding. Weights with an
+    overlapping mask predictor fit too: it is used only through the overlap stage.
     """
 
     def check(self, network: RegistrationNetwork) -> None:
-        """Refuse weights that were trained to look at the image."""
+        """Refuse weights that were trained with the image."""
         if network.vgam is not None:
             raise ValueError(
                 f"GeoTransformer: the weights {self.weights!r} were trained with a visual-geometric attention, "
-                'without which their features mean nothing; Vgam ("match.vgam") takes them'
+                'without which their features are meaningless; Vgam ("match.vgam") takes them'
             )

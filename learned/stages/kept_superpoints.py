@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""From the overlap of a level's points to the superpoints that a network works on."""
+"""From the overlap of a level's points to the superpoints that a network keeps."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from hybridreg.scene import Level, Scene, Side
 def keep(
     scene: Scene, overlap: Overlap, encoding: Encoding, config: NetworkConfig, min_overlap: float | None
 ) -> tuple[Kept, Kept]:
-    """Superpoints of target and source that the overlap leaves; what it takes to have enough is noted."""
+    """Superpoints of target and source that the overlap mask keeps; fallbacks are noted in the result."""
     omp = config.omp or OmpConfig()
     if min_overlap is not None:
         omp = replace(omp, threshold=min_overlap)
@@ -39,7 +39,7 @@ def keep(
 
 
 def _of_nodes(probability: NDArray[np.float64], level: Level, cloud: CloudEncoding) -> torch.Tensor | None:
-    # A mask that is one everywhere says nothing; GeoTransformer then keeps empty superpoints too.
+    # A mask that is one everywhere has no information; GeoTransformer then keeps empty superpoints too.
     if bool((probability == 1.0).all()):
         return None
     found = gather(probability, level.points, array(cloud.nodes))
@@ -50,12 +50,12 @@ def _note(scene: Scene, side: Side, kept: Kept, n_nodes: int) -> None:
     n = len(kept.index) + kept.capped
     if kept.fallback == "topk":
         scene.note(
-            f"{side}: the overlap mask left too few superpoints, the likeliest {n} of {n_nodes} were kept "
+            f"{side}: the overlap mask left too few superpoints, the most probable {n} of {n_nodes} were kept "
             "(mask_fallback=topk)"
         )
     elif kept.fallback == "all":
         scene.note(
-            f"{side}: the overlap mask left no superpoints to speak of, all {n} that own points were kept "
+            f"{side}: the overlap mask left hardly any superpoints, all {n} that own points were kept "
             "(mask_fallback=all)"
         )
     if kept.capped:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Clouds stood upright for a network that takes z for the vertical, and what it made of them turned back."""
+"""Levelling of tilted clouds for a network that takes z as the vertical, and the transformation back."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from hybridreg.scene import Scene
 
 Array = NDArray[np.float64]
 
-# A network has seen clouds tilted by 5 degrees in training, and takes a few more.
+# Training clouds are tilted by up to 5 degrees, and a network tolerates a few more.
 _TILTED_DEG = 10.0
 
 
@@ -35,14 +35,14 @@ class Turns:
 
     @classmethod
     def upright(cls, scene: Scene) -> Turns | None:
-        """What levels the clouds by the ground they show; None where neither is tilted."""
+        """The rotations that level the clouds by their ground; None where neither is tilted."""
         turns = [_upright(scene.level(side).ground) for side in ("target", "source")]
         if all(turn is None for turn in turns):
             return None
         return cls(*(np.eye(3) if turn is None else turn for turn in turns))
 
     def back(self, encoding: Encoding) -> Encoding:
-        """The encoding of turned clouds with its points where the clouds have them."""
+        """The encoding of rotated clouds with its points rotated back."""
         return replace(
             encoding,
             target=_turned_back(encoding.target, self.target),
@@ -51,9 +51,9 @@ class Turns:
 
 
 def likeness(encoding: Encoding) -> float:
-    """Mean cosine of each fine point's feature with the likest one of the other cloud.
+    """Mean cosine of each fine point's feature with the most similar one of the other cloud.
 
-    A ground may be a wall: of the clouds as they are and levelled, those are right whose features are more alike.
+    A ground may be a wall: of the original and the levelled clouds those with more similar features are right.
     """
     target, source = (
         F.normalize(cloud.point_features, dim=1) for cloud in (encoding.target, encoding.source)

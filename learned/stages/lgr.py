@@ -26,13 +26,13 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 Rows = NDArray[np.int64]
 
-# The published fit adds 1e-5 to the sum of the weights, which pulls it to the origin where they are faint.
+# The published fit adds 1e-5 to the sum of the weights, which pulls it towards the origin where they are small.
 _LARGEST_WEIGHT = 1e6
 
 
 @dataclass(frozen=True, kw_only=True)
 class Lgr(Stage):
-    """Each group of matches proposes a pose, all matches vote, those that agree refine it (GeoTransformer, 3.4).
+    """Each group of matches proposes a pose, all matches vote, inliers refine it (GeoTransformer, section 3.4).
 
     Parameters
     ----------

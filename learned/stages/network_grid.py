@@ -11,15 +11,15 @@ from numpy.typing import NDArray
 from hybridreg.geometry.voxel_cells import voxel_centroids
 from hybridreg.scene import Scene
 
-# Spacings that differ by less are one; beyond the second factor the scene itself may be of another size.
-_SAME, _ANOTHER_SCALE = 0.01, 2.0
+_SAME = 0.01  # relative difference below which two spacings are equal; by hand
+_ANOTHER_SCALE = 2.0  # factor beyond which the scene itself may be of another size; by hand
 
 
 def on_grid(scene: Scene, voxel: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Points of target and source, (M, 3) and (N, 3), with a spacing of ``voxel`` metres.
 
-    Levels of that spacing are taken as they are; otherwise the clouds go on a grid of the network's own, and a note
-    says so.
+    Levels of that spacing are used directly; otherwise the clouds are voxelised on the network's own grid, with a
+    note.
     """
     if note_grid(scene, voxel):
         return scene.target.points, scene.source.points
@@ -28,7 +28,7 @@ def on_grid(scene: Scene, voxel: float) -> tuple[NDArray[np.float64], NDArray[np
 
 
 def note_grid(scene: Scene, voxel: float) -> bool:
-    """Have both levels the spacing that a network was trained with? Leave a note where they have not."""
+    """Whether both levels have the spacing that a network was trained with; leaves a note where they have not."""
     ready = all(math.isclose(s, voxel, rel_tol=_SAME) for s in (scene.source.spacing, scene.target.spacing))
     if not ready:
         scene.note(_mismatch(scene.spacing, voxel))

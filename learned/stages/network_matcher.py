@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What VGAM and GeoTransformer have in common as matchers."""
+"""The common part of VGAM and GeoTransformer as matchers."""
 
 from __future__ import annotations
 

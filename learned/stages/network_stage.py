@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What the stages that run a network have in common: where its weights are, and on which device it works."""
+"""The common part of stages that run a network: the location of its weights, and its device."""
 
 from __future__ import annotations
 
@@ -18,20 +18,20 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class NetworkStage(Stage):
-    """A stage with a network behind it: the one that ``kind`` names in `hybridreg.learned.network_table`.
+    """A stage that runs the network that ``kind`` names in `hybridreg.learned.network_table`.
 
     Parameters
     ----------
     weights : str or None
         A folder that `save_pretrained` wrote, the name of weights that come with the package, or a checkpoint that
-        the network's authors published (`.pth`, `.tar`, `.pkl`). None stands for random weights.
+        the network's authors published (`.pth`, `.tar`, `.pkl`). None means random weights.
     size : str or None
         Configuration by name (`hybridreg list networks`): of random weights ("nano" if not given), or of a checkpoint
-        (found from its tensors if not given). Folders bring their own.
+        (found from its tensors if not given). Folders contain their own.
     device : str
-        As torch names it: "cpu", "cuda", "cuda:1".
+        In torch's notation: "cpu", "cuda", "cuda:1".
     untrained : bool
-        Run although the weights are random.
+        Run even though the weights are random.
     """
 
     weights: str | None = None
@@ -40,7 +40,7 @@ class NetworkStage(Stage):
     untrained: bool = False
 
     kind: ClassVar[str] = "cross3dreg"
-    # Parts that must have been trained, and whether a network of random weights looks at images.
+    # Parts that must have been trained, and whether a network with random weights uses images.
     parts: ClassVar[frozenset[str]] = frozenset({"backbone"})
     image: ClassVar[bool] = False
 
@@ -55,7 +55,7 @@ class NetworkStage(Stage):
 
     @classmethod
     def from_pretrained(cls, name_or_folder: str | os.PathLike[str], **fields: Any) -> Self:
-        """Stage of trained weights, which are read at once so that a wrong file is told here.
+        """Stage with trained weights, which are read at once so that a wrong file is reported here.
 
         Raises
         ------
@@ -70,7 +70,7 @@ class NetworkStage(Stage):
 
     @classmethod
     def load_official(cls, path: str | os.PathLike[str], **fields: Any) -> Self:
-        """Stage of a checkpoint that the network's authors published, read at once.
+        """Stage with a checkpoint that the network's authors published, read at once.
 
         Raises
         ------
@@ -86,7 +86,7 @@ class NetworkStage(Stage):
         self.network().save_pretrained(folder)
 
     def network(self) -> Any:
-        """The network in evaluation mode, of the class that ``kind`` stands for, read when it is first asked for.
+        """The network in evaluation mode, of the class that ``kind`` names, read on first access.
 
         Raises
         ------
@@ -104,16 +104,16 @@ class NetworkStage(Stage):
         return network
 
     def random_parts(self) -> list[str]:
-        """Those of this stage's parts that were never trained."""
+        """The parts of this stage that were never trained."""
         return sorted(self.parts & self._load().untrained)
 
     def note_random(self, scene: Scene) -> None:
-        """Leave a note where this stage runs although its weights are random."""
+        """Leave a note where this stage runs with random weights."""
         if self.random_parts():
             scene.note(f"{type(self).__name__} ran with random weights (untrained=True)")
 
     def sees(self) -> bool:
-        """Has the network learned to look at images? One that is random altogether counts as if it had."""
+        """Whether the network has learned to use images. An entirely random one counts as if it had."""
         loaded = self._load()
         blind = "image_encoder" in loaded.untrained and "backbone" not in loaded.untrained
         return getattr(loaded.network, "image_encoder", None) is not None and not blind
@@ -124,15 +124,15 @@ class NetworkStage(Stage):
         return load(self.network_name())
 
     def network_name(self) -> NetworkName:
-        """What tells this stage's network from others; stages of one name share one encoding of a pair."""
+        """Identity of this stage's network; stages with equal names share one encoding of a pair."""
         from hybridreg.learned.stages.networks import NetworkName
 
         image = self.weights is None and self.image
         return NetworkName(self.kind, self.weights, self.size, self.device, image, self.told())
 
     def told(self) -> tuple[tuple[str, Any], ...]:
-        """What a published checkpoint cannot tell, by the names that `load_official` of the network takes."""
+        """What a published checkpoint does not contain, as arguments of the network's `load_official`."""
         return ()
 
     def check(self, network: Any) -> None:
-        """Refuse a network that lacks what this stage runs."""
+        """Refuse a network that lacks a part that this stage runs."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Loaded networks, kept outside of the stages so that these stay plain values."""
+"""Loaded networks, kept outside the stages so that these stay plain values."""
 
 from __future__ import annotations
 
@@ -16,19 +16,19 @@ from hybridreg.learned.weights import find_files
 from hybridreg.runtime.threads import single
 
 _DEFAULT_SIZE = "nano"
-# Networks held at a time: OMP and a matcher of other weights, each beside the one before it.
+# Networks held at a time: OMP and a matcher with other weights, each with its predecessor.
 _HELD = 4
 
 
 class NetworkName(NamedTuple):
-    """All that tells one network from another."""
+    """The identity of a network."""
 
     network: str  # as `hybridreg.learned.network_table` knows it
     weights: str | None  # a folder, the name of shipped weights, a checkpoint; None for random weights
     size: str | None
     device: str
-    image: bool = False  # of a network of random weights: has it OMP and VGAM?
-    told: tuple[tuple[str, Any], ...] = ()  # what a published checkpoint cannot tell
+    image: bool = False  # of a network with random weights: has it OMP and VGAM?
+    told: tuple[tuple[str, Any], ...] = ()  # what a published checkpoint does not contain
 
 
 class Loaded(NamedTuple):
@@ -39,7 +39,7 @@ class Loaded(NamedTuple):
 
 
 def load(name: NetworkName) -> Loaded:
-    """The network of a name, read once a process and again when its files changed.
+    """The network of a name, read once per process and again when its files change.
 
     Raises
     ------
@@ -52,7 +52,7 @@ def load(name: NetworkName) -> Loaded:
 
 
 def forget() -> None:
-    """Let go of all networks that are held."""
+    """Release all networks."""
     _load.cache_clear()
 
 
@@ -64,7 +64,7 @@ def _load(name: NetworkName, stamp: tuple[int, ...]) -> Loaded:
         raise ValueError(f"device={name.device!r}: {str(error).splitlines()[0]}") from error
     if name.device.startswith("cuda") and not torch.cuda.is_available():
         raise ValueError(f"device={name.device!r}: torch finds no GPU here; use device='cpu'")
-    # A module draws weights when it is made; the caller's generator must not notice.
+    # A module draws weights when it is created; the caller's generator must not be affected.
     with single(), torch.random.fork_rng(devices=[]):
         torch.default_generator.manual_seed(0)
         network = _make(name)
@@ -81,7 +81,7 @@ def _make(name: NetworkName) -> Pretrained:
         return cls.load_official(name.weights, name.size, **dict(name.told))
     told = [f"{key}={value!r}" for key, value in (("size", name.size), *name.told) if value is not None]
     if told:
-        raise ValueError(f"{', '.join(told)}: the weights {name.weights!r} bring their own configuration")
+        raise ValueError(f"{', '.join(told)}: the weights {name.weights!r} have their own configuration")
     return cls.from_pretrained(name.weights)
 
 

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class Omp(NetworkStage):
-    """Which points does the other cloud share, judged by superpoint features and the image (Cross3DReg, 3.2).
+    """Overlap probabilities of the points from superpoint features and the image (Cross3DReg, section 3.2).
 
     Each point takes the probability of its superpoint, so that any matcher can use it. A matcher of the same
     weights shares the encoding. Without an image, a network whose OMP does not look at the other cloud knows
@@ -55,9 +55,7 @@ class Omp(NetworkStage):
             logits = network.predict_overlap(encoding)
             assert logits is not None, "check() lets no network without OMP through"
             if not logits.informed:
-                scene.note(
-                    "OMP has neither an image nor sight of the other cloud to go by: every point counts"
-                )
+                scene.note("OMP has neither an image nor the other cloud to use: every point takes part")
                 return Overlap.full(len(scene.source), len(scene.target))
             source, target = array(torch.sigmoid(logits.source)), array(torch.sigmoid(logits.target))
         return Overlap(

@@ -18,8 +18,8 @@ def spread(probability: Array, nodes: Array, points: Array) -> Array:
 def gather(probability: Array, points: Array, nodes: Array) -> Array:
     """Each superpoint (k, 3) takes the mean probability of the points (n, 3) that are nearest to it.
 
-    The reverse of `spread`: a spread mask comes back to the last digit. A superpoint that is nearest to no point
-    takes the value of the point nearest to it.
+    The inverse of `spread`: a spread mask is recovered exactly. A superpoint that is nearest to no point takes the
+    value of its nearest point.
     """
     owner = _nearest(points, nodes)
     count = np.bincount(owner, minlength=len(nodes))

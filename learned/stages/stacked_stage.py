@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What the stages of Predator and CoFiNet have in common: their network looks at both clouds stacked, on its grid."""
+"""The common part of the stages of Predator and CoFiNet, whose networks take both clouds stacked, on their own grid."""
 
 from __future__ import annotations
 
@@ -15,19 +15,20 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class StackedStage(NetworkStage):
-    """A stage of a network that takes a `Batch`, with ``weights``, ``size``, ``device``, ``untrained`` as all have."""
+    """A stage of a network that takes a `Batch`, with ``weights``, ``size``, ``device``, ``untrained`` like all
+    others."""
 
     parts: ClassVar[frozenset[str]] = frozenset({"encoder"})
 
     def batch(self, scene: Scene) -> Batch:
-        """The pair as the network sees it; what would not fit into memory is refused."""
+        """The network's input for the pair; what would not fit into memory is refused."""
         from hybridreg.learned.cross3dreg.batch import make_batch
         from hybridreg.learned.memory_estimate import require_bytes
         from hybridreg.learned.stages.network_grid import note_grid
 
         network: Any = self.network()
         voxel = network.config.backbone.voxel
-        # Levels on the network's grid are taken as they are; otherwise it makes its own from the clouds.
+        # Levels on the network's grid are used directly; otherwise it makes its own from the clouds.
         ready = note_grid(scene, voxel)
         source, target = (scene.source, scene.target) if ready else (scene.pair.source, scene.pair.target)
         batch = make_batch(

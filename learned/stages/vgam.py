@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class Vgam(NetworkMatcher):
-    """Superpoints look at the image and at their own cloud before GeoTransformer matches them (Cross3DReg, 3.3).
+    """Superpoints attend to the image and their own cloud before GeoTransformer matches them (Cross3DReg, section 3.3).
 
     Works without an image too, from the clouds alone.
     """

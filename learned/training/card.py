@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A card beside trained weights: what made them and what they were measured at. No figure is typed by hand."""
+"""The model card of trained weights: how they were trained and their measured figures. No figure is typed by hand."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Where a run stands, on disk: written whole, read safely."""
+"""Checkpoints of a training run: written whole, read safely."""
 
 from __future__ import annotations
 
@@ -22,17 +22,17 @@ _FORMAT = 1
 
 @dataclass(kw_only=True)
 class Progress:
-    """Where a run stands. Together with the seed it decides all that follows: every sample has a random generator
-    of its own, made from the seed and its number, so that no generator's state has to be kept."""
+    """Progress of a run. Together with the seed it determines all that follows: every sample has its own random
+    generator, made from the seed and its number, so that no generator's state has to be stored."""
 
     phase: int = 0
-    step: int = 0  # optimiser steps of the phase that are done
+    step: int = 0  # finished optimiser steps of the phase
     total: int = 0  # of all phases
     skipped: dict[str, int] = field(default_factory=dict)  # steps skipped, by pair
     seconds: float = 0.0  # of training, over all runs
     best: tuple[float, ...] = ()  # rank of the best validation
     best_total: int = 0  # and the step it was made at
-    window: dict[str, list[float]] = field(default_factory=dict)  # sums since the log's last line
+    window: dict[str, list[float]] = field(default_factory=dict)  # sums since the last line of the log
 
 
 def save(
@@ -43,7 +43,8 @@ def save(
     recipe: dict[str, Any],
     data: Mapping[str, str] | None = None,
 ) -> None:
-    """Write a checkpoint, whole or not at all; `data` tells the content of each source, so that a change is noticed.
+    """Write a checkpoint, whole or not at all; `data` identifies the content of each source, so that a change is
+    detected.
 
     Raises
     ------
@@ -59,14 +60,14 @@ def save(
         "optimizer": None if optimizer is None else optimizer.state_dict(),
         "data": dict(data or {}),
     }
-    # By way of memory: on a full disk torch's own writer tells neither the reason nor the file.
+    # Through memory: on a full disk torch's own writer names neither the reason nor the file.
     stored = io.BytesIO()
     torch.save(content, stored)
     write_bytes(path, stored.getvalue())
 
 
 def load(path: str | os.PathLike[str]) -> dict[str, Any]:
-    """The content of a checkpoint, its progress as `Progress`.
+    """The content of a checkpoint, with its progress as `Progress`.
 
     Raises
     ------
@@ -79,7 +80,7 @@ def load(path: str | os.PathLike[str]) -> dict[str, Any]:
         raise FileNotFoundError(f"{os.fspath(path)}: there is no checkpoint to resume from")
     content: dict[str, Any] = parse_torch(read_whole(Path(path)), os.fspath(path))
     if not isinstance(content, dict) or "format" not in content:
-        raise ValueError(f"{os.fspath(path)}: is damaged, or no checkpoint of a training run")
+        raise ValueError(f"{os.fspath(path)}: is damaged, or not a checkpoint of a training run")
     if content["format"] != _FORMAT:
         raise ValueError(f"{os.fspath(path)}: a checkpoint of format {content.get('format')}, not {_FORMAT}")
     content["progress"] = Progress(**content["progress"])

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Learning curves as CSV files: a line is there whole or not at all, and a resumed run cuts off what it repeats."""
+"""Learning curves as CSV files: lines are written whole or not at all, and a resumed run removes those that it
+repeats."""
 
 from __future__ import annotations
 
@@ -54,7 +55,7 @@ class CurveFile:
         if not self.path.is_file():
             return []
         lines = self.path.read_text(encoding="utf-8").splitlines(keepends=True)
-        # A process that was killed may have left half a line.
+        # A process that was killed may have left a partial line.
         return list(csv.DictReader(line for line in lines if line.endswith("\n")))
 
     def _text(self, row: Mapping[str, Value]) -> str:

@@ -19,10 +19,10 @@ class StepOutcome:
     """How a step went; the same on every process."""
 
     norm: float  # of the averaged gradient before clipping
-    bad: tuple[int, ...]  # places in the step's batch whose loss was not finite
+    bad: tuple[int, ...]  # indices in the step's batch whose loss was not finite
     stepped: bool
     stop: bool  # a process was asked to stop
-    due: bool  # a process holds that it is time for a checkpoint
+    due: bool  # a process says that a checkpoint is due
 
 
 def finish_step(
@@ -34,7 +34,7 @@ def finish_step(
     stop: bool,
     due: bool = False,
 ) -> StepOutcome:
-    """Add up the processes' gradients, clip, and step; a step with anything not finite is skipped by all.
+    """Sum the processes' gradients, clip, and step; a step with anything not finite is skipped by all.
 
     Parameters
     ----------
@@ -43,11 +43,11 @@ def finish_step(
     bad
         (batch,) float: 1 where a loss of this process was not finite.
     clip
-        Longest gradient.
+        Largest norm of the gradient.
     stop
-        Was this process asked to stop?
+        Whether this process was asked to stop.
     due
-        Is it time for a checkpoint by this process's clock? Clocks differ, and all must go to the same barrier.
+        Whether a checkpoint is due by this process's clock. Clocks differ, and all must reach the same barrier.
     """
     votes = torch.cat([bad, bad.new_tensor([float(stop), float(due)])])
     if fabric.world_size > 1:
@@ -62,8 +62,8 @@ def finish_step(
 
 
 def _share(fabric: Fabric, parameters: Sequence[nn.Parameter], votes: Tensor) -> Tensor:
-    # One message: all gradients, which of them are there at all, and the votes. A parameter that no process used
-    # keeps no gradient, so that the optimiser leaves it alone as in a single process.
+    # One message: all gradients, which of them exist, and the votes. A parameter that no process used gets no
+    # gradient, so that the optimiser leaves it alone, as in a single process.
     present = torch.tensor([float(p.grad is not None) for p in parameters], device=votes.device)
     flat = [(torch.zeros_like(p) if p.grad is None else p.grad).flatten() for p in parameters]
     summed = fabric.all_reduce(torch.cat([*flat, present, votes]), reduce_op="sum")

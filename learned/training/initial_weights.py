@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The network at the start of a run: random, or with what other weights already know."""
+"""The network at the start of a run: random, or with weights taken over from another."""
 
 from __future__ import annotations
 
@@ -36,12 +36,10 @@ def _take_over(network: Pretrained, start: str) -> None:
     shared = {name: tensor for name, tensor in found.items() if name in own}
     wrong = [name for name, tensor in shared.items() if tensor.shape != own[name].shape]
     if wrong or not shared:
-        reason = "no tensor bears a name of this network's"
+        reason = "no tensor has a name of this network's"
         if wrong:
             shapes = tuple(found[wrong[0]].shape), tuple(own[wrong[0]].shape)
-            reason = (
-                f"tensor {wrong[0]} has shape {shapes[0]}, not {shapes[1]}; choose the network that it is of"
-            )
+            reason = f"tensor {wrong[0]} has shape {shapes[0]}, not {shapes[1]}; choose the network that it belongs to"
         raise ValueError(f"start={start!r}: {reason}")
     network.load_state_dict(shared, strict=False)
     fresh = sorted({name.partition(".")[0] for name in own if name not in shared})

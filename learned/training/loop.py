@@ -38,7 +38,7 @@ CHECKPOINT = "checkpoint.pt"
 
 
 class Loop:
-    """A run of a recipe; ``run`` goes on from wherever ``progress`` stands."""
+    """A run of a recipe; ``run`` continues from ``progress``."""
 
     def __init__(
         self,
@@ -56,7 +56,7 @@ class Loop:
         self._saved = time.monotonic()
 
     def run(self, optimizer_state: dict[str, Any] | None = None) -> bool:
-        """Train to the end; false when the run was stopped before it, with a checkpoint written."""
+        """Train to the end; false when the run was stopped before that, with a checkpoint written."""
         while self.progress.phase < len(self.recipe.phase):
             phase = self.recipe.phase[self.progress.phase]
             optimizer = make_optimizer(phase, self.network)
@@ -100,7 +100,7 @@ class Loop:
         first: int,
         batch: int,
     ) -> torch.Tensor:
-        # Gradients of this process's share of the batch; 1 in the answer where a loss was not finite.
+        # Gradients of this process's share of the batch; 1 in the result where a loss was not finite.
         bad = torch.zeros(batch, device=self.fabric.device)
         for places in self._together(batch):
             with self.record.data_time():
@@ -122,13 +122,13 @@ class Loop:
         return bad
 
     def _together(self, batch: int) -> list[list[int]]:
-        """Places of this process in a step's batch, those together that go through the network at once."""
+        """Indices of this process in a step's batch, grouped by what is processed at once."""
         mine = list(range(self.fabric.global_rank, batch, self.fabric.world_size))
         return [mine] if self.network.together else [[place] for place in mine]
 
     def _forward(self, phase: Phase, found: Sequence[Sample | Example], samples: PhaseSamples) -> Outcome:
         seeds = np.random.SeedSequence([*self._seed(), 3, found[0].number]).generate_state(2)
-        torch.manual_seed(int(seeds[0]))  # for what the network itself draws: images left out
+        torch.manual_seed(int(seeds[0]))  # for random choices of the network itself: dropped images
         generator = torch.Generator().manual_seed(int(seeds[1]))
         here = [each.to(self.fabric.device) for each in found]
         with self.fabric.autocast():
@@ -168,7 +168,9 @@ class Loop:
         world = self.fabric.world_size
         batch = max(phase.accumulate, world)
         if batch % world:
-            raise ValueError(f"phase {phase.name!r}: accumulate={batch} is no multiple of {world} processes")
+            raise ValueError(
+                f"phase {phase.name!r}: accumulate={batch} is not a multiple of {world} processes"
+            )
         return batch
 
     def _numbers(self, batch: int, steps: int) -> list[int]:
@@ -215,7 +217,7 @@ class Loop:
 
 
 def count_parameters(network: nn.Module) -> int:
-    """Parameters of a network, frozen ones too."""
+    """Number of parameters of a network, including frozen ones."""
     return sum(parameter.numel() for parameter in network.parameters())
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The losses that a phase weighs, of one sample; what has no weight is not computed."""
+"""The weighted losses of a phase for one sample; losses without weight are not computed."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from hybridreg.learned.training.recipe import LossWeights
 
 @dataclass(frozen=True, kw_only=True)
 class Matched:
-    """What the matcher made of a sample, for the log."""
+    """The matcher's result for a sample, for the log."""
 
     encoding: Encoding
     kept: tuple[Kept, Kept]
@@ -31,7 +31,7 @@ class Matched:
 
 @dataclass(frozen=True, kw_only=True)
 class Outcome:
-    """Losses by name before they are weighed, their weighed sum, and what the log wants to know."""
+    """Losses by name before weighting, their weighted sum, and figures for the log."""
 
     total: Tensor
     parts: dict[str, Tensor]
@@ -86,7 +86,7 @@ def contrastive_loss(
     contrast: InfoNceConfig,
     generator: torch.Generator,
 ) -> tuple[Tensor, Tensor]:
-    """InfoNCE from source to target and, if wanted, back; and the share of anchors that find their partner."""
+    """InfoNCE from source to target and optionally back; and the share of anchors that find their correspondence."""
     voxel = network.config.backbone.voxel
     forth = infonce(features[1], features[0], points[0], sample.partners[1], contrast, voxel, generator)
     if not contrast.symmetric:

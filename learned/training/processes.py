@@ -17,9 +17,9 @@ _PATIENCE = timedelta(hours=12)
 
 
 def start_processes(devices: int, accelerator: str, precision: Literal["32-true", "bf16-mixed"]) -> Fabric:
-    """Join or start the processes of a run: those of ``torchrun`` where it started us, else ``devices`` of them.
+    """Join or start the processes of a run: those of ``torchrun`` where it started us, otherwise ``devices`` of them.
 
-    More processes than graphics cards share them: a pair at a time leaves most of a card idle.
+    More processes than GPUs share them: one pair at a time leaves most of a GPU idle.
 
     Raises
     ------
@@ -36,7 +36,7 @@ def start_processes(devices: int, accelerator: str, precision: Literal["32-true"
     cards = torch.cuda.device_count() if accelerator in ("auto", "cuda", "gpu") else 0
     shared = _round_robin(local, cards) if 0 < cards < local else None
     strategy: Strategy | str = "auto"
-    if shared:  # NCCL refuses two processes on one card
+    if shared:  # NCCL refuses two processes on one GPU
         strategy = DDPStrategy(parallel_devices=shared, process_group_backend="gloo", timeout=_PATIENCE)
     elif world > 1:
         strategy = DDPStrategy(timeout=_PATIENCE)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What a training run does, from data to schedule: frozen dataclasses that a TOML file fills."""
+"""Training recipes, from data to schedule: frozen dataclasses filled from a TOML file."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ class Source:
 
     Attributes
     ----------
-    data : as ``hybridreg.data.open_dataset`` takes it
-    name : by which phases and tables refer to it; the data's own text if empty
+    data : text for ``hybridreg.data.open_dataset``
+    name : how phases and tables refer to it; the data's own text if empty
     weight : share of the samples that come from here, relative to the other sources
-    pairs : only the first so many pairs; 0 for all
-    prepared : prepare all pairs once and keep them on disk; false draws and prepares them as they are needed
+    pairs : use only the first ones, up to this number; 0 for all
+    prepared : prepare all pairs once and store them on disk; false generates and prepares them when needed
     """
 
     data: str
@@ -39,7 +39,7 @@ class Source:
 
 @dataclass(frozen=True, kw_only=True)
 class DataPlan:
-    """Where the pairs come from. ``loaders`` processes prepare samples ahead of the loop; 0 does it in the loop."""
+    """Sources of the pairs. ``loaders`` processes prepare samples ahead of the loop; 0 does it in the loop."""
 
     train: tuple[Source, ...]
     val: tuple[Source, ...] = ()
@@ -65,18 +65,18 @@ class LossWeights:
 
     @property
     def matcher(self) -> bool:
-        """Is any part beyond the backbone trained?"""
+        """Whether any part beyond the backbone is trained."""
         return bool(self.coarse or self.fine or self.mask)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Phase:
-    """One stretch of training with an optimiser of its own.
+    """One phase of training with its own optimiser.
 
     Attributes
     ----------
     steps, epochs : length; exactly one of the two. An epoch shows as many samples as there are training pairs
-    rate : learning rate at its highest
+    rate : peak learning rate
     warmup : steps over which the rate rises linearly from 0
     decay : "linear" to 0 at the end; "step" by ``decay_factor`` every ``decay_every`` steps (or epochs)
     backbone_rate : factor on the rate of the backbone; 0 freezes it
@@ -118,10 +118,10 @@ class Recipe:
     ----------
     network : the network's complete configuration; plain values of it, as in a card, become one
     kind : the network's name in `hybridreg.learned.network_table`
-    start : folder or name of trained weights; tensors of the same names are taken over
+    start : folder or name of trained weights; tensors of the same names are copied
     every : steps between validations
     log_every : steps between lines of the log
-    clip : longest gradient; longer ones are shortened to it
+    clip : largest norm of the gradient
     """
 
     name: str

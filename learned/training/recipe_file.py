@@ -28,7 +28,7 @@ def read(path: str | os.PathLike[str]) -> Recipe:
     FileNotFoundError
         Neither a file nor a shipped name.
     ValueError
-        Not TOML, an unknown key, or a value that cannot be.
+        Not TOML, an unknown key, or an invalid value.
     """
     name = os.fspath(path)
     table = _content(name)
@@ -41,7 +41,7 @@ def read(path: str | os.PathLike[str]) -> Recipe:
 def _content(name: str, behind: tuple[str, ...] = ()) -> dict[str, Any]:
     # ``base`` names a recipe whose values count where this one gives none; tables are merged, lists replaced.
     if name in behind:
-        raise ValueError(f"{behind[0]}: base goes round in a circle: {' -> '.join((*behind, name))}")
+        raise ValueError(f"{behind[0]}: base refers to itself: {' -> '.join((*behind, name))}")
     table = read_toml(recipes.find(name))
     base = table.pop("base", None)
     if base is None:
@@ -54,7 +54,7 @@ def _content(name: str, behind: tuple[str, ...] = ()) -> dict[str, Any]:
 def parse(table: Mapping[str, Any], *, name: str) -> Recipe:
     """The recipe of a file's content.
 
-    ``network`` names the network, or is a table that alters it (``name`` in it is the name then); ``size``, and for
+    ``network`` names the network, or is a table that alters it (with its name as ``name``); ``size``, and for
     Cross3DReg ``omp`` and ``vgam``, choose its configuration.
     """
     base: dict[str, Any] = {
@@ -71,7 +71,7 @@ def parse(table: Mapping[str, Any], *, name: str) -> Recipe:
     else:
         parts = sorted({"omp", "vgam"} & set(table))
         if parts:
-            raise ValueError(f"recipe.{parts[0]}: a part of {DEFAULT}, which {kind} has not")
+            raise ValueError(f"recipe.{parts[0]}: a part of {DEFAULT}, which {kind} does not have")
         network = _other_network(kind, base["size"], altered)
     rest = {key: value for key, value in table.items() if key not in (*_NETWORK_KEYS, "kind")}
     return build(Recipe, {"name": name, **rest, "network": network, "kind": kind}, "recipe")
@@ -94,7 +94,7 @@ def network_of(size: str, *, omp: bool, vgam: bool, changes: Mapping[str, Any]) 
 
 
 def scaled(recipe: Recipe, factor: float) -> Recipe:
-    """The recipe with all phases longer or shorter by a factor."""
+    """The recipe with the length of all phases scaled by a factor."""
     if not factor > 0:
         raise ValueError(f"steps-scale {factor}: must be above 0")
     return dataclasses.replace(recipe, phase=tuple(_scaled(phase, factor) for phase in recipe.phase))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What a run leaves behind while it goes: learning curves, validations, the best weights."""
+"""Output of a running training: learning curves, validations, the best weights."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ _VALIDATION = tuple(Validation.__dataclass_fields__)
 class Record:
     """Sums between two lines of the log, and the files of the run.
 
-    Only the first process ``writes``; ``total`` adds up a tensor over all processes; ``losses`` names the parts of the
+    Only the first process ``writes``; ``total`` sums a tensor over all processes; ``losses`` names the parts of the
     network's loss.
     """
 
@@ -64,7 +64,7 @@ class Record:
         self._data_seconds, self._line_steps = 0.0, 0
 
     def begin_phase(self, phase: Phase, steps: int) -> None:
-        """A phase begins, or goes on."""
+        """A phase begins or continues."""
         self.reporter.begin(phase.name, steps, self.progress.step)
         self._line_clock, self._line_steps, self._data_seconds = time.monotonic(), 0, 0.0
 
@@ -76,7 +76,7 @@ class Record:
         self._data_seconds += time.monotonic() - start
 
     def outcome(self, network: Pretrained, outcome: Outcome, sample: Sample | Example) -> None:
-        """Add a sample's losses; where a line of the log is due, its matches are looked at too."""
+        """Add a sample's losses; where a line of the log is due, its matches are evaluated too."""
         self._add("loss", float(outcome.total.detach()))
         for name, loss in outcome.parts.items():
             self._add(name, float(loss.detach()))
@@ -89,7 +89,7 @@ class Record:
                 self._add(name, value)
 
     def step(self, phase: Phase, step: int, rate: float, norm: float) -> None:
-        """A step is done; write a line when it is time."""
+        """A step is done; write a line when one is due."""
         self._add("norm", norm)
         self._line_steps += 1
         self.reporter.advance()
@@ -139,7 +139,7 @@ class Record:
         if not self.progress.best or now > tuple(self.progress.best):
             self.progress.best, self.progress.best_total = now, self.progress.total
             save_pretrained(network, self.out / "best")
-        # Validation is no training: the next line's speed must not include it.
+        # Validation is not training: the next line's speed must not include it.
         self._line_clock += time.monotonic() - start
 
     def keep_time(self) -> None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What a person sees of a run: a progress bar on a terminal, else a line now and then; TensorBoard where installed."""
+"""Progress of a run: a progress bar on a terminal, otherwise a line now and then; TensorBoard where installed."""
 
 from __future__ import annotations
 
@@ -16,8 +16,9 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from hybridreg.learned.training.validation import Validation
 
 Row = Mapping[str, Any]
-# Columns of a line that are for the file alone, and those that come last.
-_HIDDEN, _LAST = ("total", "phase", "step", "skipped", "data_share", "norm"), ("rate", "steps_per_s")
+# Columns of a line that are only for the file, and those that come last.
+_HIDDEN = ("total", "phase", "step", "skipped", "data_share", "norm")
+_LAST = ("rate", "steps_per_s")
 
 
 class Reporter:
@@ -52,13 +53,13 @@ class Reporter:
             self.board.close()
 
     def begin(self, title: str, total: int, done: int = 0) -> None:
-        """A new stretch of work."""
+        """Begin a new task."""
         self.bar.reset(self._task, description=title, total=total, completed=done, figures="", visible=True)
         if not self.terminal:
             self.console.print(f"{title}: {done} of {total}", highlight=False)
 
     def advance(self) -> None:
-        """One step of it is done."""
+        """One step of the task is done."""
         self.bar.advance(self._task)
 
     def line(self, row: Row) -> None:
@@ -88,7 +89,7 @@ class Reporter:
             if isinstance(value, float) and _told(value):
                 try:
                     self.board.add_scalar(f"{group}/{name}", value, row["total"])
-                except OSError as error:  # a full disk: the curves are an extra
+                except OSError as error:  # a full disk: the curves are optional
                     self.console.print(f"TensorBoard's curves end here: {error}", highlight=False)
                     self.board = None
                     return

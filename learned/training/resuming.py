@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""May a checkpoint go on under this recipe? What shaped the steps behind it must be the same."""
+"""Whether a checkpoint can continue under this recipe: everything that shaped its past steps must be the same."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def check_same(now: Mapping[str, Any], then: Mapping[str, Any], phase: int) -> N
     Raises
     ------
     ValueError
-        Something that shaped the run is another: it is named.
+        Something that shaped the run differs: it is named.
     """
     pairs = {name: (now.get(name), then.get(name, now.get(name))) for name in _SHAPING}
     pairs["data.train"] = (now["data"]["train"], then["data"]["train"])
@@ -32,8 +32,7 @@ def check_same(now: Mapping[str, Any], then: Mapping[str, Any], phase: int) -> N
 
 
 def tell_changed_data(then: Mapping[str, str], now: Mapping[str, str]) -> None:
-    """Log the sources whose pairs have another content than when the checkpoint was written; they count as they are
-    now."""
+    """Log the sources whose pairs have changed since the checkpoint was written; their present content is used."""
     for title in sorted(name for name in now if then.get(name) and now[name] and then[name] != now[name]):
         _log.warning(
             "the data of %s has changed since the checkpoint; changed pairs are prepared again", title

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Optimiser and learning rate of a phase. The rate is a function of the step, so resuming needs no state of it."""
+"""Optimiser and learning rate of a phase. The rate is a function of the step, so resuming needs no state."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Put trained weights where the wheel takes them from: `python -m hybridreg.learned.training.ship runs/NAME/best`.
+"""Put trained weights into the package: `python -m hybridreg.learned.training.ship runs/NAME/best`.
 
 Stored in half precision, with the card of the run that made them, under the recipe's name.
 """
@@ -20,12 +20,12 @@ MOST = 25_000_000
 
 
 def ship(trained: Path, into: Path) -> Path:
-    """Copy the weights of a finished run below ``into``; the folder that holds them now.
+    """Copy the weights of a finished run below ``into``; returns their folder.
 
     Raises
     ------
     FileNotFoundError
-        No weights there, or no card: the run has not come to its end.
+        No weights, or no card: the run has not finished.
     ValueError
         All weights below ``into`` together would take more than 25 MB.
     """

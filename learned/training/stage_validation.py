@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Validation of the networks that make their own examples: their stage in a pipeline, without refinement."""
+"""Validation of networks with their own examples: their stage in a pipeline, without refinement."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ from hybridreg.learned.stages.networks import forget
 from hybridreg.pair import LabelledPair
 from hybridreg.pipeline import Pipeline
 
-# Where a network's stage is looked for: what it trains is a matcher or an estimator before it is an overlap.
+# Slots in which a network's stage is searched: a matcher or an estimator before an overlap stage.
 _SLOTS = ("match", "estimate")
 
 
 def estimator_of(name: str) -> str:
-    """By which estimator the network of a name is validated."""
+    """The estimator with which a network is validated."""
     slot, stage = _stage_of(name)
     if slot == "estimate":
         return registry.name_of(stage(untrained=True)) or stage.__name__
@@ -37,9 +37,10 @@ def estimator_of(name: str) -> str:
 def rows_of(
     network: Pretrained, pairs: list[tuple[str, LabelledPair]], device: torch.device, protocol: Protocol
 ) -> list[Row]:
-    """What the evaluator scores, of pairs by name.
+    """Rows for the evaluator, of pairs by name.
 
-    The weights go through a folder, as a user's would. A pair that its pipeline refuses counts as not registered.
+    The weights are written to and read from a folder, like a user's. A pair that its pipeline refuses counts as not
+    registered.
     """
     matches = _stage_of(network.name)[0] == "match"
     with tempfile.TemporaryDirectory() as folder:
@@ -85,7 +86,7 @@ def _row(
         return Row(index=number, id=name, T=None, T_true=matrix(truth), n_matches=0, inlier_ratio={})
     source, target = np.asarray(trace.matches.source), np.asarray(trace.matches.target)
     ratios = {}
-    if protocol is not None:  # an estimator that looks at clouds alone has no matches to be judged by
+    if protocol is not None:  # an estimator that uses only the clouds has no matches to evaluate
         ratios[f"{protocol.inlier_m:g}"] = metrics.inlier_ratio(source, target, truth, protocol.inlier_m)
     return Row(
         index=number,

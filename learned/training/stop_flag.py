@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A polite end: the first SIGINT or SIGTERM lets the step finish and a checkpoint be written."""
+"""Graceful stop: after the first SIGINT or SIGTERM the step finishes and a checkpoint is written."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from contextlib import contextmanager
 
 
 class StopFlag:
-    """Was the process asked to stop, and by which signal?"""
+    """Whether the process was asked to stop, and by which signal."""
 
     def __init__(self) -> None:
         self.asked, self.number = False, 0
 
     def __call__(self, number: int = 0, *_: object) -> None:
-        if self.asked:  # asked twice: at once
+        if self.asked:  # asked twice: stop at once
             raise KeyboardInterrupt
         self.asked, self.number = True, number
 

@@ -39,13 +39,13 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class RunOptions:
-    """What a run needs to know beside its recipe.
+    """Options of a run besides its recipe.
 
     Attributes
     ----------
     out : folder of the run
     cache : folder of prepared pairs, shared by runs
-    resume : go on from the checkpoint in ``out``
+    resume : continue from the checkpoint in ``out``
     devices, accelerator : as Lightning Fabric takes them; ``torchrun`` overrides the number
     workers : processes that prepare pairs
     """
@@ -63,12 +63,12 @@ def train(recipe: Recipe, options: RunOptions, flag: StopFlag | None = None) -> 
 
     Parameters
     ----------
-    flag : hears by which signal it was stopped
+    flag : receives the signal that stopped it
 
     Raises
     ------
     FileExistsError
-        ``out`` holds a run already, and it was not asked to go on.
+        ``out`` already holds a run, and ``resume`` is false.
     InUse
         Another process is training into ``out``.
     ValueError, FileNotFoundError
@@ -81,7 +81,7 @@ def train(recipe: Recipe, options: RunOptions, flag: StopFlag | None = None) -> 
     parent = os.getppid()
     fabric = start_processes(options.devices, options.accelerator, recipe.precision)
     if not fabric.is_global_zero or "TORCHELASTIC_RUN_ID" in os.environ:
-        end_with(parent)  # else it would wait for the others for hours
+        end_with(parent)  # otherwise it would wait for the others for hours
     options.out.mkdir(parents=True, exist_ok=True)
     with folder_lock(options.out) if fabric.is_global_zero else nullcontext():
         return _train(recipe, options, before, fabric, flag)
@@ -110,7 +110,7 @@ def _train(
             losses=network.loss_names,
             total=partial(_total, fabric) if fabric.world_size > 1 else None,
         )
-        # While pairs are being prepared a signal ends the process at once: what is prepared lies on the disk.
+        # While pairs are being prepared a signal ends the process at once: prepared pairs are on disk.
         with stop_on_signals(flag) as stop:
             loop = Loop(fabric, recipe, network, training, options.out, record, stop)
             if not loop.run(before.get("optimizer")):
@@ -129,7 +129,7 @@ def _before(recipe: Recipe, options: RunOptions) -> dict[str, Any]:
         return content
     if path.exists():
         raise FileExistsError(
-            f"{options.out} holds a run already: go on with --resume, or name another folder"
+            f"{options.out} already holds a run: continue with --resume, or name another folder"
         )
     return {}
 
@@ -154,7 +154,7 @@ def _opened(source: Source, recipe: Recipe, cache: Path, *, told: bool) -> Opene
 
 
 def _total(fabric: Fabric, values: torch.Tensor) -> torch.Tensor:
-    # Apple's GPUs know no float64.
+    # Apple's GPUs have no float64.
     kept = values.float() if fabric.device.type == "mps" else values
     summed = fabric.all_reduce(kept.to(fabric.device), reduce_op="sum")
     assert isinstance(summed, torch.Tensor)

@@ -53,7 +53,7 @@ class Validation:
 
 
 def validate(network: Pretrained, source: OpenedSource, *, matcher: bool, device: torch.device) -> Validation:
-    """Figures of a network on one source; ``matcher`` false looks at the fine features alone."""
+    """Figures of a network on one source; ``matcher`` false evaluates the fine features alone."""
     if isinstance(source, PairSource):
         assert isinstance(network, RegistrationNetwork)
         return _validate_prepared(network, source, matcher=matcher, device=device)
@@ -98,9 +98,9 @@ def _figures(
 
 
 def rank(found: Sequence[Validation], matcher: bool) -> tuple[float, ...]:
-    """What makes one validation better than another: recall, then inlier ratio; any matcher beats a warm-up.
+    """Ranking of validations: recall, then inlier ratio; any matcher beats a warm-up.
 
-    Of a network without matches the smaller turn's error is the better.
+    For a network without matches the smaller rotation error is better.
     """
     recall = _mean([each.recall for each in found]) if matcher else 0.0
     ratio = _mean([each.inlier_ratio for each in found])

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What SphereNet takes: patches about the keypoints of both clouds. No truth."""
+"""The input of SphereNet: patches around the keypoints of both clouds. No ground truth."""
 
 from __future__ import annotations
 
@@ -46,14 +46,14 @@ def make_batch(
     keypoints
         Rows of target and source to be described; None for all.
     seed
-        Of the draw of points in patches that have more than enough.
+        Of the sampling of points in patches that have more than needed.
     device
-        Where the tensors end up; patches are cut on the CPU.
+        Where the tensors are placed; patches are cut on the CPU.
 
     Raises
     ------
     ValueError
-        A cloud without points, or one that holds values that are not finite.
+        A cloud without points, or with values that are not finite.
     """
     cut = [
         _cut(cloud, rows, config, seed, name)

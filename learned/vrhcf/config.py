@@ -11,7 +11,10 @@ from typing import Any, Literal
 from hybridreg.config import limits
 from hybridreg.config.plain_values import build
 
-_WIDEST, _MOST_CELLS, _MOST_POINTS = 4096, 512, 100_000
+# A configuration may come with untrusted weights: absurd sizes are refused before memory is allocated. By hand.
+_WIDEST = 4096  # channels
+_MOST_CELLS = 512  # along a coordinate
+_MOST_POINTS = 100_000
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -59,13 +62,13 @@ def _surface(*widths: int) -> tuple[SurfaceConv, ...]:
 class SphereNetConfig:
     """The descriptor; the defaults are the published 3DMatch one with everything as released.
 
-    In four things what was released differs from what is right. Official weights and published numbers depend on
-    it, so the defaults are as released; the sizes of our own have the right ones.
+    In four points the released code differs from what is correct. Official weights and published numbers depend on it,
+    so the defaults are as released; our own sizes have the correct behaviour.
 
     ``padding``
         "released": elevation wraps around and azimuth is padded with zeros, because the padding functions were written
         for a tensor with its axes the other way round (script/common.py). "right": azimuth wraps around, elevation is
-        padded with zeros, so that a turn about the axis by whole cells changes nothing.
+        padded with zeros, so that a rotation about the axis by whole cells changes nothing.
     ``frames``
         "released": frames are made in batches of ``frame_batch``, and a batch of exactly three gets wrong ones, because
         the cross product there names no dimension. "right": every patch its own.
@@ -74,12 +77,12 @@ class SphereNetConfig:
         (module/HCF_module.py). "unit": by their own length. See `hybridreg.learned.vrhcf.keypoint_matching`.
     ``facing``
         "origin" (released): axes face the origin of each cloud's frame, so that a cloud whose frame was moved has other
-        descriptors. "sensor": they face the place that the cloud was seen from, and upwards where that is not known.
+        descriptors. "sensor": they face the cloud's viewpoint, and upwards where that is not known.
     """
 
     voxel: float = 0.025  # metres: spacing of the points that the network was trained with
     radius: float = 0.3  # metres, of a patch
-    patch_points: int = 2048  # drawn or repeated to so many; the last one is the keypoint
+    patch_points: int = 2048  # sampled or repeated to this number; the last one is the keypoint
     radial: int = 15
     azimuth: int = 40
     elevation: int = 20
@@ -95,7 +98,7 @@ class SphereNetConfig:
     positive_margin: float = 0.1
     negative_margin: float = 1.4
     loss_pairs: int = 10  # keypoint pairs of a training step
-    pair_radius: float = 0.05  # metres within which keypoints of both clouds are one under the true pose
+    pair_radius: float = 0.05  # metres within which keypoints of both clouds correspond under the true pose
 
     def __post_init__(self) -> None:
         limits.within(self, 1e-4, 1e4, "voxel", "radius", "pair_radius")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What describing keypoints costs, told before it is begun: multiply-adds and memory."""
+"""Cost of describing keypoints, known before it starts: multiply-adds and memory."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from hybridreg.learned.memory_estimate import SLACK
 from hybridreg.learned.vrhcf.config import SphereNetConfig
 
 _FLOAT = 4
-# Patches that go through the network together: more of them are no faster on a CPU.
+# Patches processed together: more of them are no faster on a CPU.
 CHUNK = 16
 # Of the largest layer: input padded twice, unfolded by the convolution, output and norm.
 _COPIES = 12
@@ -28,7 +28,7 @@ def multiply_adds(config: SphereNetConfig) -> int:
 
 
 def forward_bytes(config: SphereNetConfig, keypoints: int) -> int:
-    """Estimated peak of describing so many keypoints, in bytes, beside what the process and the patches hold."""
+    """Estimated peak of describing this many keypoints, in bytes, on top of what the process and the patches hold."""
     cells = config.azimuth * config.elevation
     largest, shells = config.radial, config.radial
     for conv in config.shells:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What a training step of SphereNet looks at."""
+"""Training examples of SphereNet."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from hybridreg.learned.vrhcf.upright_frames import place
 def example(
     pair: TruePair, config: SphereNetConfig, rng: np.random.Generator
 ) -> tuple[SphereBatch, SphereTargets]:
-    """Patches of some keypoints that both clouds of a pair show.
+    """Patches of some keypoints in the overlap of a pair.
 
     Raises
     ------

@@ -17,12 +17,13 @@ def match_descriptors(source: Tensor, target: Tensor, matching: Literal["channel
 
     "channels" divides each channel by its length over all keypoints of a cloud before descriptors are compared by
     their product. That is what was released and gave the published numbers (module/HCF_module.py normalises the wrong
-    dimension): long descriptors win, and a keypoint's partner depends on which other keypoints there are. "unit"
-    divides each descriptor by its own length, which was meant.
+    dimension): long descriptors win, and a keypoint's match depends on which other keypoints there are. "unit" divides
+    each descriptor by its own length, as intended.
     """
     dim = 0 if matching == "channels" else 1
     source, target = (d / (d.norm(dim=dim, keepdim=True) + _EPS) for d in (source, target))
-    # The distance of unit vectors, in the original's rounding: its root makes ties that the product does not have.
+    # The distance of unit vectors, in the original's rounding: its square root creates ties that the product does not
+    # have.
     blocks = [
         (2.0 - 2.0 * (block @ target.T) + _EPS).clamp_min(0.0).sqrt().argmin(1)
         for block in source.split(_ROWS)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Patches about keypoints: the points within a radius, drawn or repeated to one number."""
+"""Patches around keypoints: the points within a radius, sampled or repeated to a fixed number."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def build_patches(
     near = tree.query_ball_point(points[keypoints], r=radius)
     patches = np.empty((len(keypoints), count, 3), dtype=np.float32)
     for patch, row, around in zip(patches, keypoints, near, strict=True):
-        # Sorted: the order of the tree's answer is its own affair, and must not decide the draw.
+        # Sorted: the order of the tree's result is arbitrary, and must not affect the sample.
         patch[:] = points[_to_count(np.sort(np.asarray(around, dtype=np.int64)), count, rng)]
         patch[-1] = points[row]
     return patches

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""SphereNet's loss: a hinge on the true partner and on the nearest other one of the batch."""
+"""SphereNet's loss: a hinge on the true match and on the nearest other one of the batch (docs/methods.md 11.6)."""
 
 from __future__ import annotations
 
@@ -17,19 +17,19 @@ if TYPE_CHECKING:
     from hybridreg.learned.vrhcf.network import SphereOutput
 
 _EPS = 1e-12  # under the root, so that its gradient stays finite
-_ITSELF = 1e5  # added to the true partner's distance, so that it is not the nearest other
+_ITSELF = 1e5  # added to the true match's distance, so that it is not the nearest other
 
 
 @dataclass(frozen=True)
 class SphereLosses:
-    """The loss, and the share of anchors whose partner is nearer than every other."""
+    """The loss, and the share of anchors whose true match is nearer than every other."""
 
     total: Tensor
     accuracy: Tensor  # in [0, 1]
 
     @property
     def parts(self) -> dict[str, Tensor]:
-        """Before they are weighed, for the log."""
+        """Before weighting, for the log."""
         return {"hardest": self.total}
 
     @property
@@ -53,7 +53,7 @@ def hardest_in_batch(
     Parameters
     ----------
     anchors, partners
-        (n, d) unit descriptors; row i of both is one place. Places near by are negatives like all others, although
+        (n, d) unit descriptors; row i of both is one place. Nearby places are negatives like all others, although
         the original has a (never used) radius for them. With one pair or none there is no negative, and no loss.
     """
     if len(anchors) < 2:

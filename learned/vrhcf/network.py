@@ -65,8 +65,8 @@ class SphereLayer(nn.Module):
 def pad_sphere(x: Tensor, reach: int, *, wraps_azimuth: bool) -> Tensor:
     """Widen the last two axes (azimuth, elevation) for a kernel that covers ``reach`` cells.
 
-    One axis goes around, the other gets zeros: azimuth and elevation, or, as released, the other way round. A kernel of
-    an even reach is padded at the end alone, by half of it. A sphere with fewer cells than that is gone around several
+    One axis wraps around, the other gets zeros: azimuth and elevation, or, as released, the other way round. A kernel
+    of an even reach is padded only at the end, by half of it. A sphere with fewer cells than that is wrapped several
     times.
     """
     before, after = (0, reach // 2) if reach % 2 == 0 else ((reach - 1) // 2,) * 2
@@ -81,13 +81,13 @@ def pad_sphere(x: Tensor, reach: int, *, wraps_azimuth: bool) -> Tensor:
 
 
 class SphereNet(Pretrained):
-    """The descriptor (ThreeDMatch/model.py). No part of it takes a ground truth.
+    """The descriptor (ThreeDMatch/model.py). No part of it takes the ground truth.
 
     Parameters
     ----------
     config
-        The network; `hybridreg.learned.vrhcf.config.named_config` has those by name. Its docstring says in which points
-        the released behaviour differs from the right one.
+        The network; `hybridreg.learned.vrhcf.config.named_config` has those by name. Its docstring says in which
+        points the released behaviour differs from the correct one.
     """
 
     name: ClassVar[str] = "vrhcf"
@@ -121,8 +121,8 @@ class SphereNet(Pretrained):
         path
             A file of ``torch.save`` that holds a state dict, its names with or without the wrapper's ``module.``.
         size
-            A configuration or its name; by default ``vrhcf-3dmatch``, with everything as released. Another ``padding``
-            than "released" computes something else from these weights than they were trained for.
+            A configuration or its name; by default ``vrhcf-3dmatch``, with everything as released. A ``padding`` other
+            than "released" does not fit what these weights were trained with.
 
         Raises
         ------
@@ -138,13 +138,13 @@ class SphereNet(Pretrained):
         return network.eval()
 
     def untrained(self) -> frozenset[str]:
-        """Its norms have no parameters: the statistics that they keep tell whether any batch came by."""
+        """Its norms have no parameters: their running statistics show whether it has seen any batch."""
         kept = {name: t for name, t in self.named_buffers() if name.endswith(("running_mean", "running_var"))}
         fresh = all(bool(t.eq(1.0 if name.endswith("var") else 0.0).all()) for name, t in kept.items())
         return frozenset({"layers"}) if kept and fresh else frozenset()
 
     def forward(self, batch: SphereBatch) -> SphereOutput:
-        """Descriptors of all patches of a pair: the source's first, as batch norm notices in training."""
+        """Descriptors of all patches of a pair: the source's first, which matters to batch norm in training."""
         source = self.describe(batch.source)
         return SphereOutput(target=self.describe(batch.target), source=source)
 
@@ -153,19 +153,19 @@ class SphereNet(Pretrained):
         return losses(self.config, output, targets)
 
     def memory(self, batch: SphereBatch) -> int:
-        """Predicted peak of a forward pass in bytes, beside what the process and the batch hold already."""
+        """Predicted peak of a forward pass in bytes, on top of what the process and the batch already hold."""
         return forward_bytes(self.config, max(len(batch.target), len(batch.source)))
 
     def describe(self, patches: Tensor) -> Tensor:
         """Descriptors (n, d) of patches (n, k, 3) whose last row is the keypoint; not normalised."""
         local = self.local_points(patches)
-        # In training the norms' statistics are those of the whole cloud's patches: no parts.
+        # In training the norms' statistics are over all patches of a cloud: no chunks.
         blocks = [local] if self.training else local.split(CHUNK)
         found = [self.surface(self.voxelise(block)).amax((2, 3)) for block in blocks]
         return torch.cat(found) if found else local.new_zeros(0, self.config.width)
 
     def local_points(self, patches: Tensor) -> Tensor:
-        """Patches (n, k, 3) about their keypoints, turned upright unless ``local_frame`` is "none"."""
+        """Patches (n, k, 3) about their keypoints, aligned with their axis unless ``local_frame`` is "none"."""
         keypoints = patches[:, -1]
         centred = patches - keypoints[:, None]
         if self.config.local_frame == "none" or len(patches) == 0:
@@ -192,5 +192,5 @@ class SphereNet(Pretrained):
         return x
 
     def flattened(self, index: int, x: Tensor) -> Tensor:
-        """What layer ``index`` takes: the one shell that is left goes away before the first 2-D layer."""
+        """The input of layer ``index``: the single remaining shell is squeezed before the first 2-D layer."""
         return x[:, :, 0] if index == len(self.config.shells) else x

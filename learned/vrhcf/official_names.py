@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""How our tensors are called in SphereNet's published checkpoint, and what it holds beside them."""
+"""Names of our tensors in SphereNet's published checkpoint, and what else it contains."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ UNUSED = (*_LEFT_OVER, "xyz_raising.weight", "xyz_raising.bias")
 
 
 def official_names(network: SphereNet) -> dict[str, str]:
-    """The checkpoint's name of each of our tensors: there convolutions, norms and activations count through."""
+    """The checkpoint's name of each of our tensors: there convolutions, norms and activations are numbered together."""
     names: dict[str, str] = {}
     place = 0
     for index, layer in enumerate(network.layers):

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Spherical voxels: how many points of a patch lie in each cell of radius, azimuth and polar angle.
+"""Spherical voxels: the number of points of a patch in each cell of radius, azimuth and polar angle.
 
 Nothing is divided by the number of points or by a cell's volume, and repeated points count repeatedly. The original
-fills a tensor of (points, cells) a patch, 98 MB at 2,048 points; here eight weights a point are added up in place.
+fills a tensor of (points, cells) a patch, 98 MB at 2,048 points; here eight weights a point are accumulated in place.
 """
 
 from __future__ import annotations
@@ -24,11 +24,11 @@ def spherical(points: Tensor) -> Tensor:
 
 
 def voxels(coordinates: Tensor, radius: float, grid: Grid) -> Tensor:
-    """Points with spherical coordinates (n, k, 3) spread over cells (n, radial, azimuth, elevation).
+    """Points with spherical coordinates (n, k, 3) distributed over cells (n, radial, azimuth, elevation).
 
     Each point has weight 1 in all, linear in the three coordinates between the centres of cells. At the innermost half
     shell and at both poles the end cell takes all of it; azimuth wraps around; of the outermost half shell the part
-    beyond the end is lost; beyond ``radius`` metres nothing counts (module/SphericalVoxelization.py).
+    beyond the end is lost; nothing beyond ``radius`` metres counts (module/SphericalVoxelization.py).
     """
     radial, azimuth, elevation = grid
     r, a, e = coordinates.unbind(-1)

@@ -22,18 +22,19 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 Rows = NDArray[np.int64]
 
-# Multiply-adds of both clouds together that a stage may take unasked: a minute or so of one CPU core, and of a GPU.
-_CPU_BUDGET, _GPU_BUDGET = 1.5e12, 4e14
-# The published scripts describe at most so many keypoints of a cloud.
-_MOST, _FEWEST = 5_000, 100
+# Multiply-adds for both clouds that a stage may take by default: about a minute of one CPU core, and of a GPU.
+_CPU_BUDGET = 1.5e12
+_GPU_BUDGET = 4e14
+_MOST = 5_000  # keypoints of a cloud; as in the published scripts
+_FEWEST = 100  # keypoints that an overlap mask must leave; by hand
 
 
 @dataclass(frozen=True, kw_only=True)
 class Vrhcf(NetworkStage):
-    """Spherical descriptors of single keypoints, nearest partners in one direction (Zhao et al., ICME 2024).
+    """Spherical descriptors of single keypoints, nearest neighbours in one direction (Zhao et al., ICME 2024).
 
     With the estimator "hcf" this is VRHCF. The published descriptor takes 2.9 G multiply-adds a keypoint, a thousand
-    times what RoITr takes: without `max_keypoints` as many are described as the device does in about a minute, and a
+    times what RoITr takes: without `max_keypoints` as many are described as the device can do in about a minute, and a
     warning before the start and a note in the result say how many.
 
     Parameters
@@ -44,7 +45,7 @@ class Vrhcf(NetworkStage):
         Of a cloud, drawn at random; None as above.
     matching : "channels", "unit" or None
         How descriptors are normalised: None as the network's configuration says, "channels" for official weights, as
-        released; "unit" is the right one (`hybridreg.learned.vrhcf.keypoint_matching`).
+        released; "unit" is the correct one (`hybridreg.learned.vrhcf.keypoint_matching`).
     mutual : bool
         Keep only matches that are nearest both ways; published is without, so that each keypoint has a match.
     """

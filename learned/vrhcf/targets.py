@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Keypoint pairs of a training step, from the true pose: for training only."""
+"""Training targets: keypoint pairs of a step from the true pose."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def pair_keypoints(
     count: int,
     rng: np.random.Generator,
 ) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
-    """Rows (g,), (g,) of at most ``count`` points that are one place under the true pose, drawn at random.
+    """Rows (g,), (g,) of at most ``count`` random points that correspond under the true pose.
 
     Parameters
     ----------
@@ -44,7 +44,7 @@ def pair_keypoints(
     transform
         (4, 4) true ``T_target_source``.
     radius
-        Metres: partners are each other's nearest, and nearer than this.
+        Metres: pairs are mutual nearest neighbours closer than this.
     """
     moved = source @ transform[:3, :3].T + transform[:3, 3]
     distance, partner = cKDTree(target).query(moved)
@@ -62,7 +62,8 @@ def training_batch(
     seed: int,
     device: torch.device | str = "cpu",
 ) -> tuple[SphereBatch, SphereTargets]:
-    """Patches of ``config.loss_pairs`` true keypoint pairs, or of as many as there are, and which belong together.
+    """Patches of ``config.loss_pairs`` true keypoint pairs, or fewer if there are not as many, and which belong
+    together.
 
     Only these keypoints are described: all points of a cloud would cost hundreds of times as much.
     """

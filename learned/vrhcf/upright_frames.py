@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A patch's reference axis, what it faces, and the rotation that stands it upright."""
+"""A patch's reference axis, its orientation, and the rotation that aligns it with z."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from torch.nn import functional as F
 
 from hybridreg.scene import Level
 
-# Metres over the middle of a cloud that nobody knows the place of: axes that face it look upwards.
+# Metres above the middle of a cloud of unknown viewpoint: axes that face this point look upwards.
 _ABOVE = 100.0
 
 
@@ -40,12 +40,12 @@ def reference_axes(patches: Tensor, keypoints: Tensor) -> Tensor:
 
 
 def upright_rotations(axes: Tensor, frames: Literal["released", "right"], batch: int) -> Tensor:
-    """Rotations (n, 3, 3) with ``local = points @ R``: the smallest turn of each axis (n, 3) onto +z.
+    """Rotations (n, 3, 3) with ``local = points @ R``: the smallest rotation of each axis (n, 3) onto +z.
 
     "released" makes them in batches of ``batch`` rows, and where a batch has exactly three rows, its cross products
     mix the patches: the original names no dimension, and torch takes the first of size three. Published descriptors
-    have that error in the last three keypoints of a cloud wherever their number leaves a rest of three. An axis at
-    exactly -z gets the identity there; "right" gives it a half turn.
+    have that error in the last three keypoints of a cloud wherever their number leaves a remainder of three. An axis
+    at exactly -z gets the identity there; "right" gives it a half turn.
     """
     if frames == "right":
         return _rotations(axes, -1, half_turns=True)

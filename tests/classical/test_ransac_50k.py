@@ -30,6 +30,10 @@ def run(planted: tuple[Scene, Correspondences, np.ndarray], seed: int = 0, **fie
     return Ransac50k(**fields)(scene, matches, np.random.default_rng(seed))  # type: ignore[arg-type]
 
 
+def test_conforms() -> None:
+    testing.check_stage(Ransac50k(iterations=2000))
+
+
 def test_half_the_matches_wrong_is_no_matter(planted: tuple[Scene, Correspondences, np.ndarray]) -> None:
     pose, T = run(planted, iterations=2000), planted[2]
     error = se3.inverse(T) @ pose.T

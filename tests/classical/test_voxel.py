@@ -139,7 +139,7 @@ def test_derived_voxel_follows_the_scale_and_is_noted() -> None:
     scene = VoxelGrid()(pair)
     reach = np.quantile(np.linalg.norm(points - np.median(points, axis=0), axis=1), 0.9)
     assert scene.spacing == default_voxel(pair.source, pair.target) == pytest.approx(reach / 60, rel=0.05)
-    assert scene.notes == [f"voxel {scene.spacing:.3g} m, derived from the clouds' reach"]
+    assert scene.notes == [f"voxel {scene.spacing:.3g} m, derived from the clouds' extent"]
     far = Pair.of(points * 1000, points * 1500)
     assert default_voxel(far.source, far.target) == pytest.approx(1000 * scene.spacing)
 
@@ -155,7 +155,7 @@ def test_derived_voxel_leaves_no_cloud_too_many_points() -> None:
     assert len(scene.target) > 20_000
     assert scene.source.spacing == scene.target.spacing > reached
     assert scene.notes == [
-        f"voxel {scene.spacing:.3g} m, derived from the clouds' reach ({reached:.3g} m) and the number of points"
+        f"voxel {scene.spacing:.3g} m, derived from the clouds' extent ({reached:.3g} m) and the number of points"
     ]
     assert len(VoxelGrid(voxel=reached)(pair).target) > 70_000
 

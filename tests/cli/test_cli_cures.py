@@ -12,7 +12,7 @@ from typer.testing import CliRunner, Result
 
 from hybridreg import testing
 from hybridreg.cli.app import app
-from hybridreg.cli.command_line_cures import WORDS, spoken
+from hybridreg.cli.terminal.command_line_cures import WORDS, spoken
 
 ROOT = Path(__file__).parents[2]
 IDENTITY = ["--set", "match=none", "--set", "estimate=identity", "--set", "refine=none"]

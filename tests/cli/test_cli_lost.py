@@ -109,7 +109,8 @@ def test_a_stopped_table_keeps_its_rows_says_how_to_go_on_and_leaves_no_worker(
     assert process.returncode == code
     if code > 0:
         assert told == (
-            f"hybridreg: stopped by {number.name}; finished rows are kept in run: the same command goes on from there\n"
+            f"hybridreg: stopped by {number.name}; finished rows are kept in run: "
+            "the same command continues from there\n"
         )
     deadline = time.monotonic() + 10.0
     while any(lives(pid) for pid in below):
@@ -137,7 +138,7 @@ def test_simulate_is_stopped_alike(tmp_path: Path) -> None:
     _, told = process.communicate(timeout=LONGEST)
     assert process.returncode == 143
     assert told == (
-        "hybridreg: stopped by SIGTERM; finished pairs are kept in set: the same command goes on from there\n"
+        "hybridreg: stopped by SIGTERM; finished pairs are kept in set: the same command continues from there\n"
     )
     assert all(not folder.name.startswith(".") for folder in (tmp_path / "set").iterdir())
 

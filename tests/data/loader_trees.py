@@ -184,7 +184,7 @@ def three_dmatch(root: Path) -> Tree:
 
 @cache
 def simulated(n: int = 3) -> tuple[LabelledPair, ...]:
-    """A fan and a spinning LiDAR with a photograph."""
+    """A fan and a spinning LiDAR with a camera image."""
     from hybridreg.data import simulate
 
     return tuple(simulate.pair("near", seed=3, index=k, voxel=0.4) for k in range(n))

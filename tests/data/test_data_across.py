@@ -101,7 +101,7 @@ def test_more_clouds_than_poses(tmp_path: Path) -> None:
 
 def test_no_pairs_is_an_error(tmp_path: Path) -> None:
     tree = loader_trees.helipr(tmp_path)
-    with pytest.raises(ValueError, match="no pairs come of it"):
+    with pytest.raises(ValueError, match="it gives no pairs"):
         HeLiPr(tree.root, min_dist=1000.0)
 
 

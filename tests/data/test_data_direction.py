@@ -103,7 +103,7 @@ def test_the_check_is_made_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
 def test_poses_of_another_place_raise_a_warning(tmp_path: Path) -> None:
     away = se3.from_rt(np.eye(3), np.array([500.0, 0.0, 0.0]))
     entries = [dataclasses.replace(e, T_target_source=away) for e in listed(tmp_path).entries]
-    with pytest.warns(UserWarning, match="hardly meet"):
+    with pytest.warns(UserWarning, match="hardly overlap"):
         ListedPairs(entries, tmp_path, if_inverted="turn them")[0]
 
 

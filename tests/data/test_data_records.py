@@ -48,9 +48,9 @@ def test_rows_and_columns_are_the_same_list(tmp_path: Path) -> None:
         ({}, "unequal length"),
         ({"src": [], "rot": []}, "lists 0 pairs"),
         ({"src": ["a", "b"], "rot": [np.eye(3)]}, "src: 2, rot: 1"),
-        ("text", "no list of dictionaries"),
-        ([1, 2], "no list of dictionaries"),
-        (None, "no list of dictionaries"),
+        ("text", "not a list of dictionaries"),
+        ([1, 2], "not a list of dictionaries"),
+        (None, "not a list of dictionaries"),
         ({"src": 3}, "unequal length"),
     ],
 )
@@ -154,7 +154,7 @@ def test_poses_of_a_file(tmp_path: Path) -> None:
         ("", "holds no pose"),
         ("1 0 0 0 0 1 0 0 0 0 1 0\n1 0 0\n", "line 2: has 3 numbers, not 12"),
         ("1 0 0 0 0 one 0 0 0 0 1 0\n", "line 1: is not all numbers"),
-        ("9 0 0 0 0 1 0 0 0 0 1 0\n", "line 1: the upper left 3x3 block is no rotation"),
+        ("9 0 0 0 0 1 0 0 0 0 1 0\n", "line 1: the upper left 3x3 block is not a rotation"),
         ("1 0 0 nan 0 1 0 0 0 0 1 0\n", "line 1: the matrix is not finite"),
     ],
 )
@@ -205,9 +205,9 @@ def test_spelled_options(text: str, options: dict[str, Any]) -> None:
     [
         (
             "/data#colour=red",
-            "'colour=red' is no option; there are split=test, min_dist=10.0, inverted=False",
+            "'colour=red' is not an option; there are split=test, min_dist=10.0, inverted=False",
         ),
-        ("/data#val,5,6", "'6' is no option"),
+        ("/data#val,5,6", "'6' is not an option"),
         ("/data#min_dist=far", "min_dist='far' must be a number such as 10.0"),
         ("/data#inverted=perhaps", "must be yes or no"),
     ],

@@ -25,7 +25,7 @@ STILL = {"voxel": 0.5, "match": "none", "estimate": "identity", "refine": "none"
 
 
 class Yards(Scattered):
-    """Pairs with a photograph, as the made courtyards have."""
+    """Pairs with a camera image, as the made courtyards have."""
 
     def load(self, index: int) -> LabelledPair:
         pair, T = testing.sample_pair(index, 900)
@@ -65,7 +65,7 @@ def test_rows_of_a_control_have_the_true_mask_and_rows_of_the_pipeline_do_not(tm
     assert all(row.error is None for row in (*told, *plain))
     assert [row.mask["f1"] for row in told if row.mask] == [1.0, 1.0]
     assert [row.mask for row in plain] == [None, None]
-    assert all(any("from the truth" in note for note in row.notes) for row in told)
+    assert all(any("from the ground truth" in note for note in row.notes) for row in told)
     with pytest.raises(ValueError, match=r"another configuration .*control"):
         predict(PIPE, Yards(2), tmp_path / "oracle.jsonl")
 
@@ -109,7 +109,7 @@ def test_rows_of_a_file_become_controls_and_are_marked(tmp_path: Path) -> None:
     text = formats.markdown(done, read.protocols)
     assert f"| mask{MARK} |" in text
     assert f"| mask{MARK} | 1 | 100.0 | 100.0 | 100.0 | 100.0 |" in text, "a mask from the truth is right"
-    assert "are controls and no methods" in text
+    assert "are controls, not methods" in text
     assert r"mask $\dagger$" in formats.latex(done, read.protocols)
 
 

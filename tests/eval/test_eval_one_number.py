@@ -118,6 +118,21 @@ def test_a_shipped_network_leaves_out_what_its_filters_do_and_nothing_as_publish
     assert GeoTransformer(weights="geotransformer-small", filtered=False).unfiltered() is None
 
 
+def test_a_downsampling_that_does_not_reach_the_matcher_stands_in_the_table() -> None:
+    from hybridreg.eval.scored_table import Entry, Table
+    from hybridreg.learned.stages.network_grid import note_grid
+
+    scene, _ = testing.sample_scene()
+    assert not note_grid(scene, 0.8)
+    rows = [Row(index=0, id="p", notes=list(scene.notes))]
+    entries = [Entry(name="learned, finely", rows=rows), Entry(name="fpfh", rows=[Row(index=0, id="p")])]
+    told = Table(title="t", data="d", seed=0, starts=0, entries=entries).remarks()
+    assert told == [
+        "What the downsample slot chose did not reach the networks of learned, finely: each put the clouds on a "
+        "grid of its own"
+    ]
+
+
 def test_doctor_claims_no_package_that_nothing_imports() -> None:
     imported = set()
     for top in ("hybridreg", "classical", "learned", "eval"):

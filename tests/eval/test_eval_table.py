@@ -93,7 +93,7 @@ def test_a_folder_without_a_table_says_so(tmp_path: Path) -> None:
 
 def test_caption_names_data_starts_and_protocol(ran: tuple[Table, Path]) -> None:
     caption = ran[0].caption(CROSS)
-    for part in ("Stubs & friends", "scattered", "3 pairs", "6 runs", "1 random yaw starts", "protocol cross3dreg",
+    for part in ("Stubs & friends", "scattered", "3 pairs", "6 runs", "1 random yaw rotations", "protocol cross3dreg",
                  "RRE < 2° and RTE < 0.5 m", "within 1 m", "over all pairs"):  # fmt: skip
         assert part in caption
 

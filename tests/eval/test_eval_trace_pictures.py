@@ -77,7 +77,7 @@ def test_a_true_mask_has_no_wrong_colour_and_a_turned_one_little_else(
     assert wrong[2] > 3 * right[2]
 
 
-def test_the_photograph_stands_beside_the_mask(traced: tuple[Trace, np.ndarray], tmp_path: Path) -> None:
+def test_the_image_stands_beside_the_mask(traced: tuple[Trace, np.ndarray], tmp_path: Path) -> None:
     trace, T = traced
     blue = np.full((72, 128, 3), (10, 20, 250), np.uint8)
     for name, image in (("with", blue), ("without", None)):

@@ -76,8 +76,8 @@ def test_random_rotation_is_proper(seed: int) -> None:
     [
         (np.eye(3), "shape"),
         (np.full((4, 4), np.nan), "not finite"),
-        (np.diag([1.0, 1.0, -1.0, 1.0]), "no rotation"),
-        (np.diag([2.0, 2.0, 2.0, 1.0]), "no rotation"),
+        (np.diag([1.0, 1.0, -1.0, 1.0]), "not a rotation"),
+        (np.diag([2.0, 2.0, 2.0, 1.0]), "not a rotation"),
         (se3.from_rt(np.eye(3), np.ones(3)).T, "transposed"),
     ],
 )

@@ -42,7 +42,7 @@ def test_two_writers_lose_nothing(batch: Path) -> None:
         ({}, "lost or changed"),
         (
             {"a.jsonl": [b'{"format": 1}\n', b'{"id": "x"}\n', b'{"id": "x"}\n']},
-            "stand twice",
+            "occur twice",
         ),
     ],
 )

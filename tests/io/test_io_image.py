@@ -126,7 +126,7 @@ def test_missing_image_and_folder(tmp_path):
         read_image(tmp_path)
 
 
-def test_real_photograph(real_data):
+def test_real_camera_image(real_data):
     path = next(iter(sorted(real_data.glob("*/image.jpg"))))
     image = read_image(path)
     # OpenCV's own reader is the measure here; it gives BGR.
@@ -238,7 +238,7 @@ def test_too_many_pixels_are_refused_before_they_are_decoded(read, monkeypatch):
         read(bomb(2**31 - 1, 2**31 - 1))
 
 
-def test_a_large_photograph_is_still_read(read):
+def test_a_large_image_is_still_read(read):
     assert read(encoded(np.zeros((5000, 4000), np.uint8))).shape == (5000, 4000, 3)
 
 

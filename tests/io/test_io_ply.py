@@ -156,7 +156,7 @@ BAD_HEADERS = {
     "'1e3', not a whole number": header("element vertex 1e3", AXES.rstrip()),
     "not 'element NAME COUNT'": header("element vertex", AXES.rstrip()),
     "before any element": header("property float x"),
-    "no property of a known type": header("element vertex 1", "property quad x"),
+    "not a property of a known type": header("element vertex 1", "property quad x"),
     "'property list float": header("element vertex 1", "property list float int x"),
     "'property list'": header("element vertex 1", "property list"),
     "'property'": header("element vertex 1", "property"),

@@ -46,7 +46,7 @@ def nano() -> NetworkConfig:
 
 @pytest.fixture(scope="session")
 def batch(pair: tuple[np.ndarray, np.ndarray], nano: NetworkConfig) -> Batch:
-    """The small pair with a photograph of noise."""
+    """The small pair with a camera image of noise."""
     image = np.random.default_rng(1).integers(0, 255, (90, 160, 3), dtype=np.uint8)
     return make_batch(*pair, nano, image=image)
 

@@ -313,3 +313,17 @@ def test_the_default_preset_refines_the_demo_pair_to_centimetres() -> None:
     )
     assert se3.angle_deg(error[:3, :3]) < 0.2
     assert np.linalg.norm(error[:3, 3]) < 0.05
+
+
+def test_the_result_says_which_entry_won_and_where_the_time_went() -> None:
+    entries = (offers("one", WRONG), {"estimate": Breaks()}, offers("two", TRUTH))
+    pipeline = hr.Pipeline(match="none", estimate=hr.Candidates(of=entries, enough=1.0), refine="none")
+    result = pipeline.run(SCENE.pair)
+    won = [each.entry for each in result.entries if each.won]
+    assert len(won) == 1
+    assert "two" in won[0] or won == ["second look"]
+    assert [each.problem is None for each in result.entries[:3]] == [True, False, True]
+    assert result.entries[0].log_odds < result.entries[2].log_odds
+    assert result.seconds["refine"] > 0.0 < result.seconds["verdict"]
+    assert sum(result.seconds.values()) >= sum(each.seconds for each in result.entries)
+    assert "found by" in result.summary()

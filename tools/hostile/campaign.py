@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""How many inputs of which kind are drawn, and what became of each."""
+"""How many inputs of which kind are generated, and their outcomes."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from tools.hostile.watched import Outcome, Watched
 
 _LOT = 10
 
-# Of a hundred inputs, how many are of which kind.
+# Number of each kind in a hundred inputs.
 SHARES: dict[str, tuple[int, Callable[[], st.SearchStrategy[Any]]]] = {
     "arrays": (27, lambda: hostile_clouds.cases(default=False)),
     "arrays, preset default": (8, lambda: hostile_clouds.cases(default=True)),
@@ -33,7 +33,7 @@ SHARES: dict[str, tuple[int, Callable[[], st.SearchStrategy[Any]]]] = {
 
 @dataclass
 class Report:
-    """What a campaign saw.
+    """The result of a campaign.
 
     Attributes
     ----------
@@ -59,7 +59,7 @@ class Report:
 
 
 def _sort_of(message: str) -> str:
-    # Without folders, numbers and what is quoted.
+    # Without folders, numbers and quoted text.
     return re.sub(r"/\S*/|'[^']*'|\"[^\"]*\"|[\d.]+", "", message)[:60]
 
 
@@ -71,7 +71,7 @@ def run(
     limit: float = 30.0,
     on_case: Callable[[str, Case, Outcome], None] | None = None,
 ) -> Report:
-    """Try `n` inputs or a few more, the same ones for the same `start`.
+    """Try at least `n` inputs, the same ones for the same `start`.
 
     Parameters
     ----------
@@ -95,7 +95,7 @@ def draw(strategy: st.SearchStrategy[Case], n: int, start: int) -> list[Case]:
     """`n` different cases of a strategy."""
     drawn: dict[str, Case] = {}
 
-    # In small lots, because hypothesis goes on from what it drew before, and ever less is new.
+    # In small batches, because hypothesis continues from what it drew before, and less and less is new.
     for lot in range(n):
         if len(drawn) >= n:
             break

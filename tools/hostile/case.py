@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""One hostile input, and what the library may make of it."""
+"""One hostile input, and what the library may do with it."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ ROOTS = tuple(str(Path(str(package.__file__)).resolve().parent) for package in _
 
 
 class Case(Protocol):
-    """An input that pickles, small enough to be printed.
+    """An input that can be pickled, small enough to be printed.
 
-    `run` hands it to the library and returns a short word on what came out; it raises `AssertionError` where the
-    answer breaks a promise. `allowed` are the exceptions that the docstrings name for it.
+    `run` gives it to the library and returns a short word on the outcome; it raises `AssertionError` where the result
+    breaks a promise. `allowed` are the exceptions that the docstrings name for it.
     """
 
     kind: ClassVar[str]
@@ -34,7 +34,7 @@ def verdict_on(case: Case) -> tuple[str, str]:
     """Run a case: ("fine", what came out), ("refused", the message) or ("finding", what is wrong)."""
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter("error", RuntimeWarning)  # a NaN that nobody meant
+            warnings.simplefilter("error", RuntimeWarning)  # an unintended NaN
             warnings.simplefilter("ignore", UserWarning)  # the library's own advice on units and voxels
             return "fine", case.run()
     except BaseException as error:
@@ -47,7 +47,7 @@ def verdict_on(case: Case) -> tuple[str, str]:
 
 
 def _deliberate(error: BaseException) -> bool:
-    # An error that a dependency raises tells of its inner life, not of the user's cloud.
+    # An error raised by a dependency is about its internals, not about the user's cloud.
     frames = extract_tb(error.__traceback__)
     return bool(frames) and str(Path(frames[-1].filename).resolve()).startswith(ROOTS)
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What people keep points in, and what they hand over by mistake."""
+"""Containers of points, and other objects passed by mistake."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ def _cyclic(points: Array) -> Any:
 
 
 class Liar:
-    """Says that it holds points, and raises when asked."""
+    """Claims to hold points, and raises on access."""
 
     @property
     def points(self) -> Any:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Damage to bytes: cuts, flipped bits, pieces lost, doubled or overwritten, numbers swapped for others."""
+"""Damage to bytes: truncation, flipped bits, pieces lost, doubled or overwritten, numbers replaced."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _NUMBERS = ("0", "-1", "1", "3", "255", "65536", "2147483648", "4294967295", "18
 
 
 def damages() -> st.SearchStrategy[tuple[Damage, ...]]:
-    """Up to three kinds of damage; none at all is possible too."""
+    """Up to three kinds of damage, possibly none."""
     return st.lists(
         st.one_of(
             st.tuples(st.just("cut"), _PLACES),

@@ -43,7 +43,7 @@ PIPELINES: tuple[Any, ...] = (
 
 @dataclass(frozen=True, kw_only=True)
 class Cloud:
-    """How to make one cloud; small where the points themselves would not be."""
+    """How to make one cloud; smaller than the points themselves."""
 
     shape: str
     n: int
@@ -62,7 +62,7 @@ class Cloud:
             return points * self.scale + self.offset
 
     def make(self) -> Any:
-        """What the user hands over."""
+        """What the user passes."""
         return contain(self.points(), self.container)
 
 
@@ -96,7 +96,7 @@ class ArrayCase:
 
 
 def moved(cloud: Cloud) -> Any:
-    """A cloud turned and shifted, in its own container where that holds the points still."""
+    """A cloud rotated and shifted, in its own container where that still holds the points."""
     T = se3.yaw(40.0)
     T[:3, 3] = 0.5, -0.25, 0.1
     with np.errstate(over="ignore", invalid="ignore"):
@@ -120,7 +120,7 @@ def check(result: RegistrationResult) -> None:
 
 @st.composite
 def clouds(draw: st.DrawFn, most: int = 2) -> Cloud:
-    """Ordinary clouds with up to `most` oddities: more would all be refused for the first of them."""
+    """Ordinary clouds with up to `most` oddities: more would all be refused because of the first."""
     fields: dict[str, Any] = {
         "shape": draw(st.sampled_from(SHAPES)),
         "n": draw(st.sampled_from((60, 300, 300, 1000, 3000))),

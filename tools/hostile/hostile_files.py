@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Cloud files of every format, damaged or misnamed, and paths that lead to no file."""
+"""Cloud files of every format, damaged or misnamed, and paths without a file."""
 
 from __future__ import annotations
 

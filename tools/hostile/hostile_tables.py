@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""TOML files of pipelines, tables and training recipes: valid ones changed, and text that is none."""
+"""TOML files of pipelines, tables and training recipes: valid ones with changes, and text that is not TOML."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ if sys.version_info >= (3, 11):
 else:
     import tomli as tomllib
 
-# What a pipeline asks for beyond this is not run: a million iterations take long because they were ordered.
+# Pipelines beyond this are not run: a million iterations take long because they were requested.
 _MOST_ASKED = 10_000
 _NOISE = (
     "x = " + "[" * 3000, "a." * 3000 + "b = 1", "x = " + "9" * 5000, "[[row]]\n" * 3000, "\ufeffvoxel = 1",
@@ -46,7 +46,7 @@ class TomlCase:
     noise: str | None = None
 
     def run(self) -> str:
-        """Read the file, and run what it tells."""
+        """Read the file, and run its pipeline."""
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / "file.toml"
             path.write_bytes(self.content())
@@ -98,7 +98,7 @@ def _dump(content: Any) -> bytes:
 
     try:
         return tomli_w.dumps(content).encode()
-    except (TypeError, ValueError, AttributeError):  # the change made what TOML cannot hold
+    except (TypeError, ValueError, AttributeError):  # the change gave something that TOML cannot represent
         return repr(content).encode("utf-8", "replace")
 
 

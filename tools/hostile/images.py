@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Photographs of every size, dtype and state of repair."""
+"""Images of every size, dtype and state of damage."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ SIZES = (0, 1, 2, 3, 4, 7, 64, 257)
 
 @dataclass(frozen=True, kw_only=True)
 class PixelCase:
-    """An array handed over as the image; the learned stages see it where `used`."""
+    """An array passed as the image; the learned stages use it where `used`."""
 
     kind: ClassVar[str] = "images"
     allowed: ClassVar[tuple[type[BaseException], ...]] = (ValueError,)
@@ -39,7 +39,7 @@ class PixelCase:
     used: bool
 
     def run(self) -> str:
-        """Bring it to the one form, perhaps run a network on it."""
+        """Convert it, perhaps run a network on it."""
         pixels = filled(self.shape, self.dtype, self.fill)
         image = as_image(pixels)
         assert image.dtype == np.uint8, image.dtype
@@ -54,7 +54,7 @@ class PixelCase:
 
 @dataclass(frozen=True, kw_only=True)
 class ImageFileCase:
-    """An encoded photograph, damaged, whatever its name says."""
+    """An encoded camera image, damaged, whatever its name says."""
 
     kind: ClassVar[str] = "images"
     allowed: ClassVar[tuple[type[BaseException], ...]] = (ValueError,)
@@ -131,7 +131,7 @@ def encoded(sample: str) -> bytes:
 
 @cache
 def _network() -> Pipeline:
-    # Random weights: what an image does to the network's arithmetic does not hang on them.
+    # Random weights: the effect of an image on the network's arithmetic does not depend on them.
     blind = {"untrained": True}
     return Pipeline(
         overlap={"stage": "omp", **blind}, match={"stage": "vgam", **blind}, estimate="lgr", refine="none"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A batch in a process of its own, killed at random moments and begun again, beside one that nobody disturbed."""
+"""A batch in its own process, killed at random moments and restarted, compared with an undisturbed one."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ refine = "icp"
 [[row]]
 name = "default"
 """
-# Columns of the CSV that tell times and memory, which no two runs share, begin with these.
+# Prefixes of the CSV's columns for times and memory, which differ between runs.
 _UNSHARED = ("seconds", "peak_memory")
 _LONGEST_SECONDS = 600.0
 
@@ -55,7 +55,7 @@ class Story:
 
 
 def write_data(folder: Path, pairs: int) -> None:
-    """A folder of small made pairs."""
+    """A folder of small synthetic pairs."""
     for i in range(pairs):
         pair, T = sample_pair(i, 400)
         place = folder / f"pair-{i}"
@@ -67,7 +67,7 @@ def write_data(folder: Path, pairs: int) -> None:
 
 
 def run_whole(root: Path, out: str, workers: int) -> float:
-    """The batch without a kill; seconds."""
+    """The batch without a kill; returns seconds."""
     start = time.perf_counter()
     done = subprocess.run(command(out, workers), cwd=root, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
@@ -77,9 +77,10 @@ def run_whole(root: Path, out: str, workers: int) -> float:
 def run_killed(root: Path, out: str, *, kills: int, whole: str, workers: int, seed: int) -> Story:
     """The batch, killed (SIGKILL) at `kills` seeded moments, then run to its end.
 
-    A moment is told by rows and not by the clock, so that a busy machine does not move all of them into the imports:
-    after so many new rows, and a part of a row's time more. With no row left it falls into the writing of the reports.
-    After every kill each row that the file held whole before must stand in it unchanged, byte by byte.
+    A moment is given by rows and not by the clock, so that a busy machine does not move all of them into the imports:
+    after a number of new rows, plus a fraction of a row's time. With no row left it falls into the writing of the
+    reports.
+    After every kill each complete row of the file must still be there, byte by byte.
 
     Parameters
     ----------
@@ -125,7 +126,7 @@ def _count(lines: dict[str, list[bytes]]) -> int:
 
 
 def wait_for_rows(process: subprocess.Popen[Any], folder: Path, rows: int) -> None:
-    """Return when the files hold so many rows, or the process has ended."""
+    """Return when the files hold this many rows, or the process has ended."""
     while process.poll() is None and _count(whole_lines(folder)) < rows:
         time.sleep(0.01)
 
@@ -139,12 +140,12 @@ def whole_lines(folder: Path) -> dict[str, list[bytes]]:
 
 
 def compare(before: dict[str, list[bytes]], after: dict[str, list[bytes]]) -> None:
-    """Every finished line is still there, at its place, and no pair twice."""
+    """Every finished line is still there, in its position, and no pair twice."""
     for name, lines in before.items():
         assert after.get(name, [])[: len(lines)] == lines, f"{name}: finished lines were lost or changed"
     for name, lines in after.items():
         ids = [json.loads(line)["id"] for line in lines[1:]]
-        assert len(set(ids)) == len(ids), f"{name}: pairs stand twice"
+        assert len(set(ids)) == len(ids), f"{name}: pairs occur twice"
 
 
 def same_tables(root: Path, one: str, other: str) -> None:
@@ -172,7 +173,7 @@ def command(out: str, workers: int) -> Sequence[str]:
 
 
 def _killed_after(process: subprocess.Popen[bytes], seconds: float) -> bool:
-    # The whole group, as a machine that loses its power takes the workers along.
+    # The whole group, as in a power failure of the machine.
     try:
         process.wait(seconds)
     except subprocess.TimeoutExpired:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Other values, keys and nesting in what TOML and JSON hold."""
+"""Mutations of values, keys and nesting of TOML and JSON."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ _WORDS = (
 
 
 def changes() -> st.SearchStrategy[tuple[Change, ...]]:
-    """Up to four changes; places are numbers that wrap around the leaves there are."""
+    """Up to four changes; positions are numbers that wrap around the existing leaves."""
     place, value = st.integers(0, 60), st.sampled_from(_ODD)
     return st.lists(
         st.one_of(

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Objects of drivers, kits and tools that hold points, stand-ins for some, and such as lie about what they hold."""
+"""Objects of drivers, development kits and tools that hold points, stand-ins for some, and objects that only claim
+to."""
 
 from __future__ import annotations
 
@@ -29,7 +30,7 @@ class Frame:
 
 
 class Absent:
-    """Has every attribute that anybody asks for, and none of them means anything."""
+    """Has every attribute, none of which means anything."""
 
     def __getattr__(self, name: str) -> Any:
         if name.startswith("__"):
@@ -41,7 +42,7 @@ class Absent:
 
 
 class Endless:
-    """Holds points that hold points that hold points."""
+    """Holds points that hold points, without end."""
 
     @property
     def points(self) -> Any:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Shapes that geometry stumbles over: planes, lines, lattices, duplicates, lone returns."""
+"""Degenerate shapes: planes, lines, lattices, duplicates, isolated returns."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ def _flattened(name: str, points: Array, rng: np.random.Generator) -> Array:
 
 
 def spoil(points: Array, name: str, seed: int) -> Array:
-    """The points with some of them spoilt."""
+    """The points, some of them corrupted."""
     if len(points) == 0:
         return points
     rng = np.random.default_rng(seed)

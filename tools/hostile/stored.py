@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Stored predictions, a table's index and a pair's `meta.json`, cut off or changed."""
+"""Stored predictions, a table's index and a pair's `meta.json`, truncated or changed."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from hybridreg.testing import sample_pair
 from tools.hostile.damage import Damage, damaged, damages
 from tools.hostile.mutate import Change, changed, changes
 
-# What stands in a file of a folder that a table was run in, and in one of its data.
+# Contents of a file in a table's folder, and of one in its data.
 FILES = ("predictions/still.jsonl", "table.json", "data/pair-1/meta.json")
 
 
@@ -80,7 +80,7 @@ def cases() -> st.SearchStrategy[StoredCase]:
 
 @cache
 def _run_before() -> dict[str, bytes]:
-    """Every file of a small finished run, by its place."""
+    """Every file of a small finished run, by its path."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         for i in range(3):
@@ -129,7 +129,7 @@ def _still() -> Pipeline:
 
 
 def _dump(content: Any) -> str:
-    # NaN and Infinity are no JSON, but Python writes and reads them.
+    # NaN and Infinity are not JSON, but Python writes and reads them.
     return json.dumps(content, default=str)
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Two batches begun at once into one folder, and killed at random moments: one writes, the other is told who."""
+"""Two batches started at once in one folder, and killed at random moments: one writes, the other is refused."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ _LONGEST_SECONDS = 600.0
 
 @dataclass
 class Meetings:
-    """What happened over all rounds.
+    """The result over all rounds.
 
     Attributes
     ----------
-    refused : batches that were told who writes
-    finished : batches that came to their end
+    refused : batches that were refused with the writer's name
+    finished : batches that finished
     killed : batches that were killed
     """
 
@@ -36,10 +36,10 @@ class Meetings:
 
 
 def run_two(root: Path, out: str, *, rounds: int, workers: int, seed: int) -> Meetings:
-    """Two batches at once, again and again; whoever writes is killed, and in the end one is run alone.
+    """Two batches at once, repeatedly; the writer is killed, and in the end one is run alone.
 
-    After every round all whole rows of before stand unchanged, no file holds a pair twice or half a line in its middle,
-    and whoever did not write was refused by one sentence. A round in which a batch came to its end may refuse nobody.
+    After every round all complete rows are unchanged, no file holds a pair twice or a partial line in its middle, and
+    the other batch was refused with one sentence. A round in which a batch finished may refuse none.
 
     Raises
     ------
@@ -69,14 +69,14 @@ def run_two(root: Path, out: str, *, rounds: int, workers: int, seed: int) -> Me
 
 
 def _met(pair: Sequence[subprocess.Popen[str]]) -> None:
-    # Until one of them ended, as whoever is refused does: to start takes a busy machine a while.
+    # Until one of them ended, as a refused one does: starting takes a while on a busy machine.
     deadline = time.monotonic() + _LONGEST_SECONDS
     while all(process.poll() is None for process in pair) and time.monotonic() < deadline:
         time.sleep(0.05)
 
 
 def overwrite_is_refused(root: Path, out: str, workers: int) -> None:
-    """``--overwrite`` beside a running batch is refused, and costs that one nothing; `out` must not be there yet.
+    """``--overwrite`` during a running batch is refused, without affecting that one; `out` must not be there yet.
 
     Raises
     ------
@@ -111,7 +111,7 @@ def _begun(root: Path, out: str, workers: int, *, overwrite: bool) -> subprocess
 
 
 def _ended(process: subprocess.Popen[str], seconds: float) -> str:
-    # What it said on stderr; killed with its workers where it takes longer.
+    # Its stderr; killed with its workers where it takes longer.
     try:
         return process.communicate(timeout=seconds)[1]
     except subprocess.TimeoutExpired:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A process that tries cases one after another, watched from outside: it may crash, hang or eat the memory."""
+"""A process that tries cases one after another, watched from outside: it may crash, hang or exhaust the memory."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _MOST_MEMORY = 8 * 2**30  # bytes of address space beyond what the imports took
 
 @dataclass(frozen=True, kw_only=True)
 class Outcome:
-    """What became of a case."""
+    """The outcome of a case."""
 
     word: Literal["fine", "refused", "finding"]
     text: str
@@ -77,7 +77,7 @@ class Watched:
 
 
 def _serve(pipe: Connection) -> None:
-    # What a child prints is another library's chatter; its answers go through the pipe.
+    # What a child prints is output of other libraries; its results go through the pipe.
     devnull = os.open(os.devnull, os.O_WRONLY)
     os.dup2(devnull, 1)
     os.dup2(devnull, 2)
@@ -106,7 +106,7 @@ def _import_everything() -> None:
 
 
 def _limit_memory() -> None:
-    # So that an absurd allocation is a MemoryError here and not the end of something else on the machine.
+    # So that an absurd allocation is a MemoryError here and does not end something else on the machine.
     if sys.platform != "linux":
         return
     import resource

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Endless seeded pairs of the kinds of input on which the verdict has been wrong.
+"""An unlimited supply of seeded pairs of the kinds of input on which the verdict has been wrong.
 
 >>> from hybridreg.data.hard import KINDS, error, sample
 >>> pair = sample("map-ground", 3)

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Show what the kinds hold: `python -m hybridreg.data.hard list --seeds 3`.
+"""Show what the kinds contain: `python -m hybridreg.data.hard list --seeds 3`.
 
-Overlap is the share of the source's points with a point of the target near by at the (best) true pose: nearer than
+Overlap is the share of the source's points with a target point nearby at the (best) true pose: nearer than
 twice the median distance between neighbours in the sparser cloud, or 0.6 of the tolerance.
 """
 
@@ -35,7 +35,7 @@ def overlap(one: Sample) -> float:
 
 
 def extent(points: Array) -> float:
-    """Metres from the median point within which nine tenths of the points lie."""
+    """Radius around the median point, metres, within which nine tenths of the points lie."""
     return float(np.quantile(np.linalg.norm(points - np.median(points, axis=0), axis=1), 0.9))
 
 

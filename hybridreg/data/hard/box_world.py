@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A small world of boxes, posts and bushes on a plane, and sensors that look at it: data with exact poses.
+"""A small world of boxes, posts and bushes on a plane, and sensors that scan it: data with exact poses.
 
 Written for the tests and for the figures behind the verdict's weights, so that neither needs real data.
 """
@@ -135,7 +135,7 @@ def rays(sensor: str, density: float, rng: np.random.Generator) -> Array:
 
 
 def sensor_pose(x: float, y: float, z: float, yaw_deg: float, tilt_deg: float = 0.0) -> Array:
-    """T_world_sensor of a sensor that is turned about z, then tilted about its own x (180 hangs upside down)."""
+    """T_world_sensor of a sensor that is turned about z, then tilted about its own x (180: upside down)."""
     T = se3.yaw(yaw_deg)
     T[:3, :3] = T[:3, :3] @ se3.rotation_about(np.array([np.radians(tilt_deg), 0.0, 0.0]))
     T[:3, 3] = x, y, z

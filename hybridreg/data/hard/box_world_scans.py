@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Pairs of scans of the made worlds of the verdict's tests, in endless supply.
+"""An unlimited supply of pairs of scans in the synthetic worlds of the verdict's tests.
 
 Streets, crossings, yards, woods, rooms and corridors, each seen by two sensors, one in ten upside down and one in ten
 tilted by 30 degrees, with a third of the cars moved in between.
@@ -26,7 +26,7 @@ TARGETS = ("rings32", "rings64", "rings64", "hemisphere", "rings16")
 
 @dataclass(frozen=True, eq=False)
 class Sight:
-    """One world as two sensors saw it, with the true pose (4, 4)."""
+    """One world seen by two sensors, with the true pose (4, 4)."""
 
     kind: str
     pair: Pair

@@ -12,7 +12,7 @@ from hybridreg.data.hard.sights import AROUND, LIDARS, level, lidar, look, merge
 from hybridreg.data.hard.true_poses import Sample
 from hybridreg.geometry import se3
 
-# One room among many must be told from the others.
+# One room among many must be distinguishable from the others.
 _ROOM = Bar(facing=100.0, drop=0.12)
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Scans in their sensors' frames: plain, tilted, hung upside down, cut to what is near, thinned to few points."""
+"""Scans in their sensors' frames: plain, tilted, upside down, cropped to what is near, thinned to few points."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ _ANY = (LIDARS, LIDARS)
 
 
 def plain(rng: np.random.Generator, seed: int) -> Sample:
-    """Two scans with nothing odd about them: what mistakes are made of."""
+    """Two ordinary scans: the material that mistakes are made from."""
     source, target, _ = scans(rng, seed, apart=(1.0, 8.0))
     return judged(source, target, METRES, GRAIN)
 
 
 def tilt(rng: np.random.Generator, seed: int) -> Sample:
-    """One sensor or both lean by 10 to 40 degrees."""
+    """One sensor or both are tilted by 10 to 40 degrees."""
     both = rng.random() < 0.4
     mounts = mount(rng) @ _lean(rng), mount(rng) @ (_lean(rng) if both else np.eye(4))
     source, target, _ = scans(rng, seed, apart=(1.0, 12.0), mounts=mounts)
@@ -33,14 +33,14 @@ def tilt(rng: np.random.Generator, seed: int) -> Sample:
 
 
 def upside_down(rng: np.random.Generator, seed: int) -> Sample:
-    """One sensor hangs upside down: its own z points at the ground."""
+    """One sensor is mounted upside down: its own z points at the ground."""
     over = se3.from_rt(se3.rotation_about(np.array([np.pi, 0.0, 0.0])), np.zeros(3))
     source, target, _ = scans(rng, seed, apart=(1.0, 12.0), mounts=(mount(rng) @ over, mount(rng)))
     return judged(*_either(rng, source, target), METRES, GRAIN)
 
 
 def crop(rng: np.random.Generator, seed: int) -> Sample:
-    """Both scans cut to what lies near their sensors, within a circle or a box."""
+    """Both scans cropped to what lies near their sensors, within a circle or a box."""
     source, target, _ = scans(rng, seed, (AROUND, LIDARS), apart=(1.0, 6.0))
     circle = rng.random() < 0.6
     half = np.full(2, rng.uniform(8.0, 12.0)) if circle else rng.uniform(7.0, 12.0, 2)
@@ -56,7 +56,7 @@ def few(rng: np.random.Generator, seed: int) -> Sample:
     thinned = _some(rng, source, n_source)
     other = _some(rng, target, n_target) if rng.random() < 0.6 else target
     sample = judged(thinned, other, METRES, GRAIN)
-    # Surface is compared before the thinning: few points hold the same surfaces, but seldom the same spots.
+    # Surface is compared before the thinning: few points lie on the same surfaces, but seldom at the same spots.
     plenty = min(len(sample.source), len(sample.target)) >= 400
     return replace(sample, solvable=one.solvable and plenty)
 

@@ -40,7 +40,7 @@ def unit(rng: np.random.Generator, seed: int) -> Sample:
 
 
 def doubled(rng: np.random.Generator, seed: int) -> Sample:
-    """The target, a map or a scan, holds itself twice, 1 to 4 m and up to 3 degrees apart."""
+    """The target, a map or a scan, contains itself twice, 1 to 4 m and up to 3 degrees apart."""
     make = maps.map_sensor if rng.random() < 0.5 else hung.plain
     pair = _solvable(make, rng, seed)
     turn, far = rng.uniform(0.0, 2.0 * np.pi), rng.uniform(1.0, 4.0)
@@ -67,7 +67,7 @@ def _ordinary(rng: np.random.Generator, seed: int) -> Sample:
 
 
 def _solvable(make: Maker, rng: np.random.Generator, seed: int) -> Sample:
-    # The first that a good method finds; a pair that is hopeless anyway would say nothing about the mistake.
+    # The first that a good method solves; a hopeless pair would say nothing about the mistake.
     for _ in range(12):
         pair = make(rng, seed)
         if pair.solvable:

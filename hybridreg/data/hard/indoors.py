@@ -69,7 +69,7 @@ def floor(rng: np.random.Generator) -> tuple[Place, list[Room]]:
 
 
 def stand_in(place: Place, here: Room, rng: np.random.Generator) -> tuple[float, float]:
-    """A free place in a room, as far from everything as a few dozen tries find."""
+    """A free position in a room, as far from everything as a few dozen tries find."""
     reach = np.maximum([here.half_x - 0.4, here.half_y - 0.4], 0.2)
     for clearance in (0.7, 0.45, 0.3, 0.15):
         for _ in range(60):
@@ -81,7 +81,7 @@ def stand_in(place: Place, here: Room, rng: np.random.Generator) -> tuple[float,
 
 def furnish(place: Place, here: Room, rng: np.random.Generator, n_things: int) -> None:
     """Cupboards and shelves along the walls, tables, chairs, pillars and crates anywhere."""
-    # No more than leave room to walk.
+    # No more than leaves room to walk.
     for _ in range(min(n_things, int(2.0 * here.half_x * here.half_y))):
         thing = rng.choice(["cupboard", "table", "chair", "crate", "pillar", "picture"])
         yaw = rng.choice([0.0, np.pi / 2, rng.uniform(0.0, np.pi)])

@@ -36,6 +36,6 @@ KINDS = tuple(_MAKERS)
 
 
 def sample(kind: str, seed: int) -> Sample:
-    """The pair of a kind with a seed; the same one every time."""
+    """The pair of a kind with a seed; always the same one."""
     rng = np.random.default_rng([seed, zlib.crc32(kind.encode())])
     return replace(_MAKERS[kind](rng, seed), kind=kind, name=f"{kind}-{seed}")

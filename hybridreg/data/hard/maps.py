@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Fused maps of many stops against a scan, in frames whose origin is a sensor's place or nothing of the kind."""
+"""Fused maps of many stops against a scan, in frames whose origin is a sensor's position or not."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 
 
 def map_ground(rng: np.random.Generator, seed: int) -> Sample:
-    """A map whose origin lies in or about the ground, in a building or far away."""
+    """A map whose origin lies in or near the ground, in a building or far away."""
     place, fused = _mapped(rng, seed)
     return _against(rng, place, fused.within(_frame(place, fused, rng)), fused.T_world)
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Streets, crossings, yards and towns, with the ground of every third rolling by a few centimetres."""
+"""Streets, crossings, yards and towns, every third with ground relief of a few centimetres."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ def _yard(place: Place, rng: np.random.Generator) -> None:
 
 
 def _town(place: Place, rng: np.random.Generator) -> None:
-    # Houses of any yaw about two wide roads that cross, with posts and cars anywhere.
+    # Houses of any yaw around two wide roads that cross, with posts and cars anywhere.
     for _ in range(30):
         x, y = rng.uniform(-80, 80, 2)
         if min(abs(x), abs(y)) > 9:
@@ -88,7 +88,7 @@ def _town(place: Place, rng: np.random.Generator) -> None:
 
 
 def _clutter(place: Place, rng: np.random.Generator) -> None:
-    # Bins, bollards, low walls and crates near the middle: what a cropped scan has to go by.
+    # Bins, bollards, low walls and crates near the middle: all that a cropped scan has to rely on.
     for _ in range(rng.integers(4, 12)):
         turn, far = rng.uniform(0, 2 * np.pi), rng.uniform(4, 14)
         x, y = far * np.cos(turn), far * np.sin(turn)

@@ -23,12 +23,12 @@ def base(place: Place, x: float, y: float, yaw: float) -> Array:
 
 
 def stand(place: Place, rng: np.random.Generator, clearance: float = 1.2) -> Array:
-    """A free place near the middle, any yaw."""
+    """A free position near the middle, any yaw."""
     return _near(place, rng, 0.0, 0.0, 0.0, 6.0, clearance)
 
 
 def next_to(place: Place, rng: np.random.Generator, first: Array, low: float, high: float) -> Array:
-    """A free place `low` to `high` metres from `first` (4, 4), any yaw."""
+    """A free position `low` to `high` metres from `first` (4, 4), any yaw."""
     return _near(place, rng, first[0, 3], first[1, 3], low, high, 1.2)
 
 
@@ -76,6 +76,6 @@ def scans(
 
 
 def _facing(rng: np.random.Generator, first: Array, second: Array) -> Array:
-    # Two sensors that look ahead must look at the same things.
+    # Two sensors that look ahead must look at the same objects.
     yaw = np.degrees(np.arctan2(second[1, 0], second[0, 0])) + rng.uniform(-30.0, 30.0)
     return se3.from_rt(se3.yaw(float(yaw))[:3, :3], first[:3, 3])

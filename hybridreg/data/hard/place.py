@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A place made of boxes, posts and bushes on ground that may roll, ready for rays."""
+"""A place made of boxes, posts and bushes on ground that may be uneven, ready for ray casting."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from hybridreg.data.simulate.world.solids import boxes, cards, loft, quads
 Array = NDArray[np.float64]
 Size = tuple[float, float, float]
 _GREY = (0.5, 0.5, 0.5)
-# Metres; what stands outdoors goes this deep, so that no ray slips under it where the ground rolls.
+# Metres; what stands outdoors goes this deep, so that no ray passes under it where the ground is uneven.
 _FOOT = 0.4
 
 
@@ -25,14 +25,14 @@ _FOOT = 0.4
 class Place:
     """What stands still, what may move between two scans (cars), and where something stands."""
 
-    relief: float = 0.0  # metres, height of the ground's waves
+    relief: float = 0.0  # metres, height of the ground relief
     phase: Array = field(default_factory=lambda: np.zeros(3))
     fixed: list[Mesh] = field(default_factory=list)
     loose: list[Mesh] = field(default_factory=list)
     rects: list[tuple[float, float, float, float, float]] = field(default_factory=list)
 
     def box(self, x: float, y: float, z: float, size: Size, yaw: float = 0.0, loose: bool = False) -> None:
-        """A closed box whose lower face has its middle at x, y, z; `yaw` in radians."""
+        """A closed box whose lower face is centred at x, y, z; `yaw` in radians."""
         foot = _FOOT if z == 0.0 and self.relief else 0.0
         base = np.array([[x, y, z - foot]])
         mesh = boxes(base, np.add(size, [0.0, 0.0, foot]), yaw, "plaster", _GREY)
@@ -93,7 +93,7 @@ class Place:
         return Part(Mesh.merge(self.fixed))
 
     def world(self, rng: np.random.Generator | None = None, clear: Sequence[Array] = ()) -> World:
-        """The place at one moment; with `rng` a third of what is loose has moved by some metres along x.
+        """The place at one moment; with `rng` a third of the movable objects have moved by some metres along x.
 
         Nothing moves to within 4.5 m of where a frame of `clear` (4, 4) stands.
         """

@@ -15,7 +15,7 @@ Array = NDArray[np.float64]
 
 
 def tunnel(rng: np.random.Generator, seed: int) -> Sample:
-    """A tunnel or corridor with ribs every 2 to 5 m, bare or with a few things."""
+    """A tunnel or corridor with ribs every 2 to 5 m, bare or with a few objects."""
     place, half, height = Place(), rng.uniform(1.2, 3.0), rng.uniform(2.4, 4.5)
     rib, step = rng.uniform(0.1, 0.3), rng.uniform(2.0, 5.0)
     for side in (-1, 1):
@@ -48,7 +48,7 @@ def tunnel(rng: np.random.Generator, seed: int) -> Sample:
 
 
 def rack(rng: np.random.Generator, seed: int) -> Sample:
-    """Rows of racks in a warehouse; irregular goods and end walls tell one bay from another."""
+    """Rows of racks in a warehouse; irregular goods and end walls distinguish one bay from another."""
     place, bay, aisle = Place(), rng.uniform(2.2, 3.0), rng.uniform(2.6, 3.6)
     n_bays, n_rows = int(rng.integers(8, 14)), int(rng.integers(3, 6))
     deep, storey, n_levels = rng.uniform(0.9, 1.2), rng.uniform(1.2, 1.8), int(rng.integers(2, 5))
@@ -65,7 +65,7 @@ def rack(rng: np.random.Generator, seed: int) -> Sample:
             for v in (-1, 1):
                 place.box(0.0, y + v * deep / 2, k * storey, (2 * half_x, 0.05, 0.12))
         _goods(place, rng, filled, regular, bay, half_x, y, storey, n_levels, deep)
-    if rng.random() < 0.6:  # a hall in view, with a thing or two along its walls
+    if rng.random() < 0.6:  # a hall in view, with an object or two along its walls
         for side in (-1, 1):
             place.box(side * (half_x + rng.uniform(3, 6)), 0.0, 0.0, (0.3, 2 * half_y + 8, 8.0))
             place.box(0.0, side * (half_y + rng.uniform(1, 4)), 0.0, (2 * half_x + 8, 0.3, 8.0))

@@ -26,7 +26,7 @@ def depth_room(rng: np.random.Generator, seed: int) -> Sample:
     """A depth camera against another one that is turned by 20 to 60 degrees, or a LiDAR in the same room."""
     place, here = room(rng)
     world, at = place.world(), np.array(stand_in(place, here, rng))
-    # Towards the middle, give or take: a camera that fills its view with one bare wall has nothing to say.
+    # Roughly towards the middle: a camera that sees nothing but one bare wall has no information.
     yaw = np.degrees(np.arctan2(here.y - at[1], here.x - at[0])) + rng.normal(0.0, 25.0)
     source = look(world, _depth(rng), _held(rng, at, yaw), rng)
     if rng.random() < 0.6:
@@ -41,7 +41,7 @@ def depth_room(rng: np.random.Generator, seed: int) -> Sample:
 
 
 def lidars(rng: np.random.Generator, seed: int) -> Sample:
-    """Two LiDAR scans of a room with nothing odd about them."""
+    """Two ordinary LiDAR scans of a room."""
     place, here = room(rng)
     world, shots = place.world(), []
     for names in (LIDARS, AROUND):
@@ -65,13 +65,13 @@ def flat(rng: np.random.Generator, seed: int) -> Sample:
         beams, span = int(rng.choice([360, 720, 1080, 1440])), float(rng.choice([270.0, 360.0]))
         rays = planar(beams, span, rng.uniform(12.0, 30.0), rng.uniform(0.005, 0.03))
         shots.append(look(world, rays, level(rng, at[0], at[1], height, 0.0), rng))
-    # A plane has no upper side: a pose that turns it over mirrors the room.
+    # A plane has no upper side: a pose that flips it mirrors the room.
     rivals = _quarter_turns(here) + [flip_about(here.x, here.y, height, axis) for axis in (0, 1)]
     return judged(shots[0], shots[1], METRES, 0.1, rivals, _PLANE)
 
 
 def _depth(rng: np.random.Generator) -> Rays:
-    # 1 to 2 mm near by, up to 10 mm at 6 m.
+    # 1 to 2 mm at close range, up to 10 mm at 6 m.
     return camera((60.0, 45.0), 6.0, rng.uniform(0.001, 0.002), rng.uniform(0.5, 2.2) * 1e-4, near=0.4)
 
 

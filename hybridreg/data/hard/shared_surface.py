@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""How much surface two clouds share at a pose, which ways it faces, and whether that is enough to find the pose."""
+"""How much surface two clouds share at a pose, in which directions it faces, and whether that suffices to find the
+pose."""
 
 from __future__ import annotations
 
@@ -18,21 +19,21 @@ Array = NDArray[np.float64]
 
 
 class Bar(NamedTuple):
-    """What two clouds must share for a good method to find their pose; by hand, on some 20 pairs of each kind."""
+    """What two clouds must share for a good method to find their pose; set by hand on some 20 pairs of each kind."""
 
     # Common share of the cloud that shares more.
     share: float = 0.25
     # Common voxels that face along the weakest axis: number, and share of all common ones.
     facing: float = 20.0
     weakest: float = 0.02
-    # By how much the common share must fall at a repetition.
+    # How much lower the common share must be at a repetition.
     drop: float = 0.05
     # 2 for clouds in a plane.
     axes: int = 3
 
 
 class Common(NamedTuple):
-    """Share of the source's voxels on surface that the target holds too, and the normals there (n, 3)."""
+    """Share of the source's surface voxels that the target has too, and the normals there (n, 3)."""
 
     share: float
     normals: Array
@@ -97,7 +98,7 @@ def judged(
     rivals: Iterable[Array] = (),
     bar: Bar | None = None,
 ) -> Sample:
-    """A sample of two shots whose frames' poses say what is right."""
+    """A sample from two shots, whose frames' poses give the true pose."""
     return Sample(
         kind="",
         name="",

@@ -97,7 +97,7 @@ def pose(x: float, y: float, z: float, yaw: float, pitch: float = 0.0, roll: flo
 
 
 def level(rng: np.random.Generator, x: float, y: float, z: float, lean: float = 1.0) -> Array:
-    """Pose (4, 4) of a sensor of any yaw that leans by `lean` degrees or so."""
+    """Pose (4, 4) of a sensor of any yaw tilted by about `lean` degrees."""
     return pose(x, y, z, rng.uniform(0.0, 360.0), rng.normal(0.0, lean), rng.normal(0.0, lean))
 
 

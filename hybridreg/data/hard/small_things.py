@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Views of small things by a depth camera or a hand scanner."""
+"""Views of small objects by a depth camera or a hand-held scanner."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from hybridreg.data.hard.true_poses import Sample
 from hybridreg.geometry import se3
 
 Array = NDArray[np.float64]
-# A table may fill most of the view, and says little.
+# A table may fill most of the view without saying much.
 _THING = Bar(weakest=0.01)
 
 

@@ -18,7 +18,7 @@ DEGREES = 2.0
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Sample:
-    """Two clouds (N, 3) as a user would hand them over, and what is right about them."""
+    """Two clouds (N, 3) as a user would give them, and their right poses."""
 
     kind: str
     name: str
@@ -30,7 +30,7 @@ class Sample:
     metres: float
     # Whether a good method should find it: enough common surface that faces three ways, and no repetition.
     solvable: bool
-    # The mistake that the input holds: "mirror", "scale 0.95" (multiply the source), "mm", "cm" or "ft".
+    # The mistake that the input contains: "mirror", "scale 0.95" (multiply the source), "mm", "cm" or "ft".
     cure: str = ""
 
 
@@ -41,7 +41,7 @@ def error(sample: Sample, T: Array) -> tuple[float, float]:
     """Degrees and metres between T (4, 4) and the nearest right pose; both infinite where no pose is right.
 
     Metres are those by which the median point of the source moves: in a frame with a far origin the difference of
-    the translations says more about the rotation than about the place.
+    the translations says more about the rotation than about the position.
     """
     middle = np.median(sample.source, axis=0)[None]
     off = [

@@ -52,7 +52,7 @@ def _lifted(rng: np.random.Generator) -> Array:
 
 
 def _rig(rng: np.random.Generator) -> list[tuple[str, Array]]:
-    # Names of the LiDARs with their places on the vehicle.
+    # Names of the LiDARs with their positions on the vehicle.
     rig = []
     for k in range(rng.integers(2, 5)):
         if k == 0:

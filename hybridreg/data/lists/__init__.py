@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: MIT
-"""What loaders share: lists of pairs, trajectories, and where the files lie."""
+"""What loaders share: lists of pairs, trajectories, and the locations of files."""

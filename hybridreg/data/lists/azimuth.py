@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Which kind of sensor took a cloud: the directions it looked in tell."""
+"""Which kind of sensor took a cloud, by the directions that it covers."""
 
 from __future__ import annotations
 
@@ -11,14 +11,16 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 _BINS = 36
-# A bin that holds less than this share of the points was met by stray returns, not scanned.
+# A bin with less than this share of the points holds stray returns and was not scanned.
 _STRAY = 0.002
-_SPINNING_DEG, _SPINNING_SHARE, _LIMITED_DEG = 300.0, 0.8, 200.0
+_SPINNING_DEG = 300.0  # degrees from first to last direction of a spinning sensor, at least; by hand
+_SPINNING_SHARE = 0.8  # of its bins that are occupied, at least; by hand
+_LIMITED_DEG = 200.0  # degrees of a limited field of view, at most; by hand
 
 
 @dataclass(frozen=True)
 class Azimuth:
-    """Horizontal coverage about the origin: from first to last direction, and the share of 360 deg."""
+    """Horizontal coverage around the origin: from first to last direction, and the share of 360 deg."""
 
     span_deg: float
     share: float

@@ -47,7 +47,7 @@ def _meant(
     if not equals and free:
         return free[0], word
     known = ", ".join(f"{p.name}={p.default}" for p in parameters) or "none"
-    raise ValueError(f"{text}: {word!r} is no option; there are {known}")
+    raise ValueError(f"{text}: {word!r} is not an option; there are {known}")
 
 
 def _typed(value: str, parameter: inspect.Parameter, text: str) -> Any:

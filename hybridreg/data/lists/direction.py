@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Do the poses of a data set map source to target, or the other way round? The overlap tells."""
+"""Whether the poses of a data set map source to target or the other way round, by the overlap."""
 
 from __future__ import annotations
 
@@ -19,9 +19,10 @@ from hybridreg.pair import LabelledPair
 Array = NDArray[np.float64]
 
 PAIRS = 20
-# More points than these change the overlap in the third digit only.
-_SOURCE, _TARGET = 4_000, 60_000
-# Below this the clouds hardly meet at all, whichever way round.
+# More points than these change the overlap only in the third digit.
+_SOURCE = 4_000
+_TARGET = 60_000
+# Below this the clouds hardly overlap in either direction.
 _HARDLY = 0.02
 
 
@@ -30,7 +31,7 @@ class WrongDirection(ValueError):
 
 
 class Readable(Protocol):
-    """Pairs that can be read without the check that is made here."""
+    """Pairs that can be read without the check of this module."""
 
     overlap_radius: float
 
@@ -96,7 +97,7 @@ def check(pairs: Readable, name: str, cure: str) -> None:
         raise WrongDirection(f"{name}: {found}; the poses seem to map target to source, {cure}")
     if found.as_given < _HARDLY:
         warnings.warn(
-            f"{name}: {found}; the clouds hardly meet, are the poses theirs?", UserWarning, stacklevel=3
+            f"{name}: {found}; the clouds hardly overlap, are the poses theirs?", UserWarning, stacklevel=3
         )
 
 

@@ -10,14 +10,14 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-WINDOW = 100  # frames ahead that are looked at
+WINDOW = 100  # frames ahead that are considered
 
 
 def kitti_pairs(positions: Array, distance: float = 10.0) -> list[tuple[int, int]]:
-    """The field's pairs of a KITTI sequence: from a frame, the last before the way exceeds `distance`.
+    """The usual pairs of a KITTI sequence: each frame with the last one before the distance exceeds `distance`.
 
     The rule of D3Feat, which Predator, CoFiNet and GeoTransformer share: among the next 100 frames the first
-    farther than `distance` is j; the pair is (i, j - 1), and the walk goes on at j.
+    farther than `distance` is j; the pair is (i, j - 1), and the next pair starts at j.
 
     Parameters
     ----------
@@ -40,14 +40,14 @@ def kitti_pairs(positions: Array, distance: float = 10.0) -> list[tuple[int, int
 def pairs_across(
     source: Array, target: Array, sources: Collection[int], targets: Collection[int], min_dist: float
 ) -> list[tuple[int, int]]:
-    """Pairs of two sensors on one drive: with frame i goes the first j >= i at least `min_dist` off.
+    """Pairs of two sensors on one drive: frame i with the first j >= i at least `min_dist` away.
 
     Parameters
     ----------
     source, target : (N, 3), (M, 3)
         Where each sensor's frames were taken, in one world frame, metres.
     sources, targets : collections of int
-        Frames whose clouds are there.
+        Frames with a cloud.
     min_dist : float
         Metres; 0 pairs each frame with the other sensor's frame of the same number.
     """

@@ -50,7 +50,7 @@ class Drive:
         FileNotFoundError
             No poses, or no scans.
         ValueError
-            More or fewer poses than scans, so that pairs would silently be others than the field's.
+            More or fewer poses than scans, so that pairs would silently differ from the published ones.
         """
         name = f"{self.number:02d}.txt"
         file = required_files.first(

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""KITTI's pairs made anew: the field's walk, odometry, and ICP composed on the right side."""
+"""KITTI's list of pairs: the usual frame spacing, odometry, and ICP composed on the right side."""
 
 from __future__ import annotations
 
@@ -25,9 +25,12 @@ from hybridreg.runtime.workers import spread
 Array = NDArray[np.float64]
 
 COMPOSITION = "T_icp @ M"
-# The pair whose published pose is wrong, left out by everyone since Predator.
+# The pair with a wrong published pose, left out by everyone since Predator.
 _LEFT_OUT = {(8, 15, 58)}
-_MAX_DISTANCE, _ITERATIONS, _VOXEL = 0.2, 200, 0.1
+# ICP as in the published lists.
+_MAX_DISTANCE = 0.2  # metres
+_ITERATIONS = 200
+_VOXEL = 0.1  # metres, by hand
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -44,7 +47,7 @@ class ListedPose:
 
 
 def place(base: Path, split: str) -> Path:
-    """Where the list of a split lies."""
+    """The file of a split's list."""
     return base / "metadata" / f"hybridreg-{split}.json"
 
 
@@ -59,7 +62,7 @@ def walk(base: Path, split: str) -> Iterator[tuple[int, int, int]]:
 def refined(drive: Drive, source: int, target: int) -> ListedPose:
     """The pose of two scans: point-to-point ICP within 0.2 m on a 0.1 m grid, started at the odometry M.
 
-    ICP runs from M on, so its correction is multiplied on the left: `T = T_icp @ M`. The lineage's
+    ICP starts at M, so its correction is multiplied on the left: `T = T_icp @ M`. The published code's
     `M @ T_icp` applies the correction in the wrong frame (FCGF issue 65).
     """
     from hybridreg.classical.icp import Icp
@@ -82,7 +85,7 @@ def refined(drive: Drive, source: int, target: int) -> ListedPose:
 
 
 def write(root: Path, split: str = "test", workers: int = 1) -> Path:
-    """Make the list of a split and write it, whole or not at all; returns its place.
+    """Make the list of a split and write it, whole or not at all; returns its path.
 
     Raises
     ------

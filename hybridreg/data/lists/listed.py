@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Pairs listed by their files: what every loader of a published data set makes."""
+"""Pairs listed by their files: what every loader of a published data set returns."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ from hybridreg.data.lists.pair_files import PairFiles, PairTable
 from hybridreg.data.lists.required_files import refuse_missing
 from hybridreg.pair import LabelledPair
 
-# What this process has seen to point the right way. Not kept in the set itself: a parallel run unpickles a
-# set afresh for every task, which would then read 20 pairs to hand out one.
+# Data sets whose direction this process has checked. Not kept in the set itself: a parallel run unpickles a set for
+# every task, which would then read 20 pairs to return one.
 _CHECKED: set[tuple[str, int]] = set()
 
 
 class ListedPairs(Dataset):
-    """A data set whose pairs are listed by their files; a pair is read when it is asked for.
+    """A data set whose pairs are listed by their files; a pair is read on access.
 
     Parameters
     ----------
@@ -32,8 +32,8 @@ class ListedPairs(Dataset):
     origin : path
         What the list came from, for messages.
     if_inverted : str
-        Where nobody has vouched for the poses' direction: what to do if they prove inverted. The first pair
-        asked for then has up to 20 pairs' poses compared with their inverses (`hybridreg.data.lists.direction`).
+        Where the poses' direction is not certain: what to do if they turn out to be inverted. The first access then
+        compares the poses of up to 20 pairs with their inverses (`hybridreg.data.lists.direction`).
     overlap_radius : float
         Metres within which two points count as the same place: 0.5 outdoors.
     fields : tuple of str
@@ -42,7 +42,7 @@ class ListedPairs(Dataset):
     Raises
     ------
     FileNotFoundError
-        A listed file is not there.
+        A listed file does not exist.
     ValueError
         No entries, or two of one id.
     """
@@ -60,7 +60,7 @@ class ListedPairs(Dataset):
         self.overlap_radius = overlap_radius
         self.if_inverted = if_inverted
         if not self.entries:
-            raise ValueError(f"{origin}: no pairs come of it; are its clouds and poses those of one drive?")
+            raise ValueError(f"{origin}: it gives no pairs; are its clouds and poses of one drive?")
         _refuse_doubles(self.entries.ids, origin)
         refuse_missing((f for e in entries for f in e.files() if f is not None), str(origin))
 
@@ -76,7 +76,7 @@ class ListedPairs(Dataset):
         return self.entries.ids
 
     def read(self, index: int) -> LabelledPair:
-        """Read pair `index` as it is listed, without a look at the direction of its pose."""
+        """Read pair `index` as it is listed, without checking the direction of its pose."""
         return self.entries[index].read()
 
     def load(self, index: int) -> LabelledPair:
@@ -90,7 +90,7 @@ class ListedPairs(Dataset):
             _CHECKED.add(key)
 
     def check(self) -> None:
-        """Refuse poses of the wrong direction; runs before the first pair is handed out."""
+        """Refuse poses of the wrong direction; runs before the first pair is returned."""
         from hybridreg.data.lists import direction
 
         direction.check(self, str(self.origin), self.if_inverted)

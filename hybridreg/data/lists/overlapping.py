@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Leaving out pairs that hardly overlap: measured once, then kept beside the data as JSON."""
+"""Leaving out pairs that hardly overlap: measured once, then stored beside the data as JSON."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from hybridreg.io import write_json
 def overlapping(
     entries: Sequence[PairFiles], root: Path, least: float, radius: float
 ) -> list[tuple[PairFiles, float]]:
-    """Pairs whose overlap is at least `least`, with it.
+    """Pairs whose overlap is at least `least`, with their overlap.
 
     All overlaps are measured the first time, which reads every cloud, and written to
     `root/hybridreg-overlaps-<key>.json`; the key changes with the pairs, their poses, the radius, and the size and
@@ -27,7 +27,7 @@ def overlapping(
     Warns
     -----
     UserWarning
-        `root` cannot be written to, so that the next time will measure again.
+        `root` cannot be written to, so that overlaps are measured again next time.
     """
     from hybridreg.data.lists.direction import overlap
 
@@ -56,7 +56,7 @@ def _kept(file: Path, entries: Sequence[PairFiles]) -> dict[str, float] | None:
     try:
         shares = json.loads(file.read_text(encoding="utf-8"))["overlap"]
         return {entry.id: float(shares[entry.id]) for entry in entries}
-    except (OSError, ValueError, KeyError, TypeError):  # none yet, or damaged: what is measured replaces it
+    except (OSError, ValueError, KeyError, TypeError):  # none yet, or damaged: it is replaced
         return None
 
 

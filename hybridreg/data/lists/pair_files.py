@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Where the files of pairs lie, one by one and as a table that travels lightly between processes."""
+"""The files of pairs, one by one and as a table that is quickly sent between processes."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class PairFiles:
-    """Where one pair lies, and its true pose.
+    """The files of one pair, and its true pose.
 
     Attributes
     ----------
@@ -31,7 +31,7 @@ class PairFiles:
     T_target_source : (4, 4) float64
     image : Path or None
     overlap : float or None
-        As the data set's own list tells it.
+        From the data set's own list.
     source_sensor, target_sensor : str
     facts : mapping
         For reports; becomes `pair.meta`.
@@ -66,7 +66,7 @@ class PairFiles:
 class PairTable(Sequence[PairFiles]):
     """Pairs column by column.
 
-    Every task of a parallel run carries its data set along: ten thousand `Path`s take a second to pickle,
+    Every task of a parallel run carries its data set: ten thousand `Path`s take a second to pickle,
     their texts a hundredth of it.
     """
 
@@ -82,7 +82,7 @@ class PairTable(Sequence[PairFiles]):
         return len(self.ids)
 
     def digest(self) -> int:
-        """Changes when the names of the pairs or their poses do, not with the place of the files."""
+        """Changes with the names of the pairs or their poses, not with the location of the files."""
         return zlib.crc32(repr(self.ids).encode(), zlib.crc32(np.round(self._T, 9).tobytes()))
 
     def paths(self, index: int) -> list[str]:
@@ -114,7 +114,7 @@ class PairTable(Sequence[PairFiles]):
 
 
 def _checked(image: Path) -> Any:
-    # Decoded when a stage looks at it.
+    # Decoded when a stage reads it.
     check_image(image)
     return image
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Lists of pairs as the field publishes them: the same facts under many names."""
+"""Published lists of pairs: the same facts under many names."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def read_records(path: Path) -> list[Record]:
     FileNotFoundError
         Nothing lies at `path`.
     ValueError
-        Empty, damaged, of another form, or with something that would run (`pickles.read_pickle`).
+        Empty, damaged, of another form, or with code that would run (`pickles.read_pickle`).
     """
     content, name = read_pickle(path), str(path)
     if isinstance(content, Mapping):
@@ -97,7 +97,7 @@ def number(record: Record, aliases: Sequence[str], label: str) -> int:
     Raises
     ------
     ValueError
-        The field is not there, or holds none.
+        The field is missing, or holds no number.
     """
     value = need(record, aliases, label)
     if isinstance(value, (float, np.floating)):
@@ -134,12 +134,12 @@ def sequence(record: Record, label: str) -> str:
 
 
 def overlap(record: Record, label: str) -> float | None:
-    """The overlap that the list tells, or None.
+    """The overlap that the list gives, or None.
 
     Raises
     ------
     ValueError
-        It is no share.
+        It is not a share.
     """
     value = find(record, ("overlap",))
     if value is None:
@@ -155,7 +155,7 @@ def transform_of(record: Record, label: str) -> Array:
     Raises
     ------
     ValueError
-        Neither is there, or they are no rigid motion.
+        Both are missing, or they are not a rigid motion.
     """
     whole = find(record, TRANSFORM)
     if whole is not None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Reading other people's pickles without running what they carry."""
+"""Reading untrusted pickles without running code that they carry."""
 
 from __future__ import annotations
 
@@ -67,10 +67,10 @@ class Forbidden(Exception):
 
 
 class PlainUnpickler(pickle.Unpickler):
-    """Knows the few names that pickled numpy arrays need, and stands in for them with functions of its own.
+    """Accepts only the few names that pickled numpy arrays need, and replaces them with functions of its own.
 
-    So it matters neither under which name numpy filed them (`numpy.core` until 1.26, `numpy._core` from 2.0)
-    nor what the real ones could be talked into.
+    So neither numpy's module names matter (`numpy.core` until 1.26, `numpy._core` from 2.0), nor what the real
+    functions could be made to do.
     """
 
     def __init__(self, stream: io.BytesIO) -> None:

@@ -23,14 +23,14 @@ _OLD_FORMAT = 0x1950A86A20F9469CFC6C
 def read_pth(path: Path) -> NDArray[np.float64]:
     """Points (N, 3) of a `.pth` file that holds an array or a tensor, without running what it carries.
 
-    The published fragments are numpy arrays, which PyTorch's own safe reader refuses; tensors go to it.
+    The published fragments are numpy arrays, which PyTorch's own safe reader refuses; tensors are read by that.
 
     Raises
     ------
     FileNotFoundError
         Nothing lies at `path`.
     ValueError
-        Damaged, something else than points, or with a class that an array does not need.
+        Damaged, not points, or with a class that an array does not need.
     ImportError
         A tensor, without torch installed.
     """
@@ -57,7 +57,7 @@ def _from_zip(data: bytes, name: str) -> Any:
 def _from_stream(data: bytes, name: str) -> Any:
     stream = io.BytesIO(data)
     if pickles.load(stream, name) != _OLD_FORMAT:
-        raise fault(name, "does not begin as files of PyTorch do")
+        raise fault(name, "does not begin like a file of PyTorch")
     for _ in range(2):  # the protocol's number, and the sizes of types on the machine that wrote it
         pickles.load(stream, name)
     if _is_tensor(data[stream.tell() :], name):

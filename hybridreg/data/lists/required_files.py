@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: MIT
-"""Where a data set's files must lie, and one sentence where they do not."""
+"""Where a data set's files must be, and one sentence where they are not."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 from pathlib import Path
 
-# Formats in the order in which archives tend to hold them.
+# Formats in the order in which archives tend to use them.
 CLOUDS = (".ply", ".pcd", ".bin", ".npy", ".npz", ".pth", ".las", ".laz", ".xyz", ".txt")
 IMAGES = (".jpg", ".jpeg", ".png", ".webp", ".bmp", ".tif")
 
@@ -17,7 +17,7 @@ def folder(path: Path, what: str) -> Path:
     Raises
     ------
     FileNotFoundError
-        "`what` is missing", with the place.
+        "`what` is missing", with the path.
     """
     if not path.is_dir():
         raise FileNotFoundError(f"{what} is missing; it must be the folder {path}")
@@ -25,12 +25,12 @@ def folder(path: Path, what: str) -> Path:
 
 
 def first(paths: Iterable[Path], what: str) -> Path:
-    """The first of `paths` that is there.
+    """The first of `paths` that exists.
 
     Raises
     ------
     FileNotFoundError
-        "`what` is missing", with all places where it may lie.
+        "`what` is missing", with all paths where it may be.
     """
     candidates = list(paths)
     for path in candidates:
@@ -40,7 +40,7 @@ def first(paths: Iterable[Path], what: str) -> Path:
 
 
 def frames(path: Path, what: str) -> dict[int, Path]:
-    """Clouds of a folder by frame: the number that the file's name is.
+    """Clouds of a folder by frame number, which is the file's name.
 
     Raises
     ------
@@ -57,13 +57,13 @@ def frames(path: Path, what: str) -> dict[int, Path]:
 
 
 class Shelf:
-    """Which files there are, asked folder by folder: ten thousand clouds cost a few reads."""
+    """Which files exist, listed folder by folder: ten thousand clouds cost a few reads."""
 
     def __init__(self) -> None:
         self._names: dict[Path, frozenset[str]] = {}
 
     def has(self, path: Path) -> bool:
-        """Whether `path` is there."""
+        """Whether `path` exists."""
         parent = path.parent
         if parent not in self._names:
             held = (each.name for each in parent.iterdir()) if parent.is_dir() else ()
@@ -71,13 +71,13 @@ class Shelf:
         return path.name in self._names[parent]
 
     def variant(self, path: Path, suffixes: tuple[str, ...]) -> Path | None:
-        """`path`, or the file of the same name with another of `suffixes`; None where there is neither."""
+        """`path`, or the file of the same name with another of `suffixes`; None where neither exists."""
         others = (path.with_suffix(suffix) for suffix in suffixes)
         return next((each for each in (path, *others) if self.has(each)), None)
 
 
 def refuse_missing(wanted: Iterable[Path], what: str) -> None:
-    """Raise one sentence that counts the files that are not there.
+    """Raise one sentence with the number of missing files.
 
     Raises
     ------

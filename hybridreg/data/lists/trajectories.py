@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Poses as KITTI writes them: twelve numbers a line, the upper three rows of T_world_sensor."""
+"""Trajectories in KITTI's format: twelve numbers a line, the upper three rows of T_world_sensor."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ _ROUNDING = 1e-2
 
 
 def read_poses(path: Path) -> Array:
-    """Poses (N, 4, 4) of a KITTI-format file, rotations made exact.
+    """Poses (N, 4, 4) of a KITTI-format file, rotations orthogonalised.
 
     Raises
     ------
     FileNotFoundError
         Nothing lies at `path`.
     ValueError
-        No lines, a line without twelve numbers, or one that is no rigid motion.
+        No lines, a line without twelve numbers, or one that is not a rigid motion.
     """
     lines = [line for line in _text(path).splitlines() if line.strip()]
     if not lines:
@@ -46,7 +46,7 @@ def read_calibration(path: Path) -> Array:
 
 
 def read_matrix(path: Path) -> Array:
-    """Rigid motion (4, 4) of a text file with sixteen (or twelve) numbers."""
+    """Rigid motion (4, 4) from a text file with sixteen (or twelve) numbers."""
     numbers = _text(path).replace(",", " ").split()
     if len(numbers) not in (12, 16):
         raise fault(str(path), f"holds {len(numbers)} numbers", "a pose has sixteen, four a line")
@@ -54,7 +54,7 @@ def read_matrix(path: Path) -> Array:
 
 
 def rigid(matrix: Any, label: str) -> Array:
-    """A pose (4, 4) with its rotation made exact, if that changes no more than rounding did.
+    """A pose (4, 4) with its rotation orthogonalised, if that changes it by no more than rounding.
 
     Raises
     ------

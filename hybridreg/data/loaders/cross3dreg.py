@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Cross3DReg: a spinning and a semi-solid-state LiDAR with photographs, 13 231 pairs (arXiv 2509.06456)."""
+"""Cross3DReg: a spinning and a semi-solid-state LiDAR with camera images, 13 231 pairs (arXiv 2509.06456)."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class Cross3DReg(ListedPairs):
     FileNotFoundError
         Saying what is missing and where it must lie.
     ValueError
-        The list is empty, damaged, or asks for classes that a list of pairs has no use for.
+        The list is empty, damaged, or refers to classes that a list of pairs does not need.
     """
 
     def __init__(

@@ -33,11 +33,11 @@ class Rule:
     Parameters
     ----------
     min_dist : float
-        Metres between the two frames, at least; 0 pairs frames of one number.
+        Metres between the two frames, at least; 0 pairs frames of the same number.
     min_overlap : float
-        Share of the source's points that the target must have seen; 0 asks for none and reads no cloud.
+        Least share of the source's points with a target point nearby; 0 requires none and reads no cloud.
     radius : float
-        Metres within which a point counts as seen.
+        Metres within which a point counts as overlapping.
     """
 
     min_dist: float = 10.0
@@ -57,17 +57,17 @@ class CrossLidar(ListedPairs):
     source, target : str
         The sensors' folders below `root`.
     min_dist, min_overlap, radius : float
-        `Rule`. With `min_overlap` the list is made once and kept as JSON in `root`.
+        `Rule`. With `min_overlap` the list is made once and stored as JSON in `root`.
     source_calib, target_calib : str
-        KITTI calibration below `root` whose `Tr` carries that sensor's points to the camera, where its poses
-        are the camera's.
+        KITTI calibration below `root` whose `Tr` maps that sensor's points to the camera, where its poses are the
+        camera's.
 
     Raises
     ------
     FileNotFoundError
-        Saying what is missing and where it must lie.
+        Saying what is missing and where it must be.
     ValueError
-        Poses that are none, or no frames that fit the rule.
+        Invalid poses, or no frames that fit the rule.
     """
 
     def __init__(
@@ -83,7 +83,7 @@ class CrossLidar(ListedPairs):
     ) -> None:
         base = required_files.folder(Path(root), "the folder of both sensors")
         rule = Rule(min_dist=min_dist, min_overlap=min_overlap, radius=radius)
-        # A reconstruction may have clouds for its keyframes alone.
+        # A reconstruction may have clouds only for its keyframes.
         sources = Track.read(base, source, source_calib, whole=False)
         targets = Track.read(base, target, target_calib, whole=False)
         super().__init__(
@@ -106,7 +106,7 @@ class Track:
         Raises
         ------
         FileNotFoundError
-            No folder, clouds, poses or calibration; saying where they must lie.
+            No folder, clouds, poses or calibration; saying where they must be.
         ValueError
             Clouds without poses, or the reverse where `whole`.
         """

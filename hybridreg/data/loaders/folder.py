@@ -15,25 +15,25 @@ from hybridreg.geometry import se3
 from hybridreg.io.structured import read_json
 from hybridreg.pair import LabelledPair, Pair
 
-# Only these reach the pair: calibrations and checks in a meta.json may hold the pose, or let one compute it.
+# Only these fields reach the pair: others in a meta.json may contain the pose, or allow computing it.
 _FREE_FACTS = ("kind", "source_sensor", "target_sensor", "licence")
 
 
 class PairFolder(Dataset):
-    """Pairs in the sub-folders of `root`; those that hold neither a source nor a `meta.json` are passed over.
+    """Pairs in the sub-folders of `root`; those with neither a source nor a `meta.json` are skipped.
 
     Parameters
     ----------
     root : path
         `root/<id>/source.*` and `target.*` are clouds of any format that `hybridreg.io` reads, `image.*` is a
-        photograph, and `meta.json` holds `T_target_source`, 4x4, row by row, metres; perhaps `source_viewpoint` and
+        camera image, and `meta.json` holds `T_target_source`, 4x4, row by row, metres; perhaps `source_viewpoint` and
         `target_viewpoint`: [x, y, z] where the sensor stood in its cloud's frame, "none", or
         {"places": [[x, y, z], ...], "of_point": [row of each point's place, ...]}.
 
     Raises
     ------
     FileNotFoundError
-        Saying what is missing and where it must lie.
+        Saying what is missing and where it must be.
     ValueError
         Two files where one is expected.
     """
@@ -69,7 +69,7 @@ class PairFolder(Dataset):
         return content.looks_of_all(file for name in self.ids for file in _files(self.root / name).values())
 
     def pair_fingerprint(self, index: int) -> str:
-        """Of the content of the pair's own files, so that a folder that grows keeps what was computed of its pairs."""
+        """From the content of the pair's own files, so that results stay valid when the folder grows."""
         name = self.ids[index]
         digests = {kind: content.digest(file) for kind, file in _files(self.root / name).items()}
         total = hashlib.blake2b(repr((name, sorted(digests.items()))).encode(), digest_size=8)
@@ -104,7 +104,7 @@ def _viewpoint(meta: dict[str, Any], side: str) -> Any:
 
 
 def _is_pair(folder: Path) -> bool:
-    # A hidden folder is one that was being written when its process was killed.
+    # A hidden folder was being written when its process was killed.
     if folder.name.startswith("."):
         return False
     return folder.is_dir() and ((folder / "meta.json").is_file() or any(folder.glob("source.*")))

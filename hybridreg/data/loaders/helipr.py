@@ -14,7 +14,7 @@ from hybridreg.data.loaders.cross_lidar import CURE, Rule, Track, pairs_of
 class HeLiPr(ListedPairs):
     """Frames of one LiDAR against frames of another, more than 10 m on.
 
-    Avia against Ouster is the closest public kin of Cross3DReg, without images.
+    Avia against Ouster is the closest public equivalent of Cross3DReg, without images.
 
     Parameters
     ----------
@@ -28,7 +28,7 @@ class HeLiPr(ListedPairs):
     Raises
     ------
     FileNotFoundError
-        Saying what is missing and where it must lie.
+        Saying what is missing and where it must be.
     """
 
     def __init__(

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""KITTI odometry as the field's benchmark of LiDAR registration: pairs about 10 m apart."""
+"""KITTI odometry as the usual benchmark of LiDAR registration: pairs about 10 m apart."""
 
 from __future__ import annotations
 
@@ -26,9 +26,9 @@ _Made = tuple[list[PairFiles], tuple[str, ...]]
 
 
 class Kitti(ListedPairs):
-    """Pairs of scans of one sequence; the field's limits are 5 deg and 2 m.
+    """Pairs of scans of one sequence; the usual thresholds are 5 deg and 2 m.
 
-    Which poses are used is told by `poses` and by every pair's `meta["poses"]`, because they differ: FCGF,
+    `poses` and every pair's `meta["poses"]` say which poses are used, because they differ: FCGF,
     Predator and CoFiNet multiplied the ICP correction on the wrong side (FCGF issue 65).
 
     Parameters
@@ -41,15 +41,14 @@ class Kitti(ListedPairs):
     poses : str
         "published": `metadata/<split>.pkl` of GeoTransformer, as it is. "own": what `hybridreg datasets
         kitti-list` writes to `metadata/hybridreg-<split>.json`, composed `T_icp @ M`. "icp": Predator's
-        `icp/S_i_j.npy`, composed `M @ T_icp`. "odometry": `poses/NN.txt` without ICP. Empty: the first that
-        is there.
+        `icp/S_i_j.npy`, composed `M @ T_icp`. "odometry": `poses/NN.txt` without ICP. Empty: the first that exists.
 
     Raises
     ------
     FileNotFoundError
-        Saying what is missing and where it must lie.
+        Saying what is missing and where it must be.
     ValueError
-        The list is empty, damaged, or asks for classes that a list of pairs has no use for.
+        The list is empty, damaged, or refers to classes that a list of pairs does not need.
     """
 
     def __init__(self, root: str | os.PathLike[str], split: str = "test", poses: str = "") -> None:

@@ -103,7 +103,7 @@ class PandaSet(ListedPairs):
 
     def read(self, index: int) -> LabelledPair:
         entry = self.entries[index]
-        image: Any = entry.image  # a path, which the pair reads when it is asked for
+        image: Any = entry.image  # decoded when a stage looks at it
         if image is not None:
             check_image(image)
         facts = entry.facts

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""`sim:test/near`: simulated pairs as a data set, drawn when they are asked for."""
+"""`sim:test/near`: simulated pairs as a data set, generated on access."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class Simulated(Dataset):
     Parameters
     ----------
     text : "SPLIT/TIER", then perhaps "/SEED", then perhaps "#PAIRS"
-        "test/near" is what tables compare on: seed 0, 50 pairs. "train/far/3#200" has seed 3 and 200 pairs.
+        "test/near" is what tables are computed on: seed 0, 50 pairs. "train/far/3#200" has seed 3 and 200 pairs.
 
     Raises
     ------
@@ -57,7 +57,7 @@ class Simulated(Dataset):
         return f"sim{self.version}-{pair_id(self.split, self.tier, self.seed, index)}"
 
 
-# Yaw starts ask for the same pair several times in a row.
+# Yaw rotations read the same pair several times in a row.
 @lru_cache(maxsize=1)
 def _drawn(split: str, tier: str, seed: int, index: int) -> LabelledPair:
     return pair(tier, seed=seed, index=index, split=split)

@@ -13,12 +13,12 @@ from hybridreg.data.lists.pair_files import PairFiles
 from hybridreg.data.lists.trajectories import read_matrix
 from hybridreg.geometry import se3
 
-# Pattern of the pairs' folders to the sensor that Kinect's cloud is registered to.
+# Pattern of the pairs' folders, and the sensor that Kinect's cloud is registered to.
 _FOLDERS = {"kinect_lidar/*/*": "lidar", "kinect_sfm/*/*": "sfm"}
 
 
 class ThreeDCsr(ListedPairs):
-    """Kinect (source) against LiDAR or SfM (target), no images; the field's limits are 15 deg and 0.3 m.
+    """Kinect (source) against LiDAR or SfM (target), no images; the usual thresholds are 15 deg and 0.3 m.
 
     Parameters
     ----------
@@ -31,7 +31,7 @@ class ThreeDCsr(ListedPairs):
     Raises
     ------
     FileNotFoundError
-        Saying what is missing and where it must lie.
+        Saying what is missing and where it must be.
     """
 
     def __init__(self, root: str | os.PathLike[str], part: str = "") -> None:

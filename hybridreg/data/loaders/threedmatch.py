@@ -25,9 +25,9 @@ class ThreeDMatch(ListedPairs):
     Raises
     ------
     FileNotFoundError
-        Saying what is missing and where it must lie.
+        Saying what is missing and where it must be.
     ValueError
-        The list is empty, damaged, or asks for classes that a list of pairs has no use for.
+        The list is empty, damaged, or refers to classes that a list of pairs does not need.
     """
 
     def __init__(self, root: str | os.PathLike[str], part: str = "3DMatch") -> None:

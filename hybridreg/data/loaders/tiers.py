@@ -16,7 +16,7 @@ _LEFT_OUT = "09"  # its poses are not trusted
 class Tiers(ListedPairs):
     """Frames of one LiDAR against frames of another, more than 2 m on, that share 30% at 0.1 m.
 
-    Overlaps are measured the first time, which reads every cloud of the list, and kept as JSON in `root`.
+    Overlaps are measured the first time, which reads every cloud of the list, and stored as JSON in `root`.
 
     Parameters
     ----------
@@ -31,7 +31,7 @@ class Tiers(ListedPairs):
     Raises
     ------
     FileNotFoundError
-        Saying what is missing and where it must lie.
+        Saying what is missing and where it must be.
     """
 
     def __init__(

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""How far apart the two sensors stand and how much they share."""
+"""Tiers of difficulty: how far apart the two sensors are and how much they overlap."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ class Tier:
 
     distance: tuple[float, float]  # metres between the sensors, level
     overlap: tuple[float, float]  # share of the thinned source with a target point within 0.5 m
-    scenes: dict[str, float]  # scene kinds and how often each comes
-    # Raised whenever the simulator draws this tier's pairs anew; results are comparable within one version only.
+    scenes: dict[str, float]  # scene kinds and their frequencies
+    # Raised whenever this tier's pairs change; results are comparable only within one version.
     version: int = 2
 
 
@@ -24,7 +24,7 @@ TIERS = {
     "mid": Tier((12.0, 18.0), (0.25, 0.8), USUAL),
     "far": Tier((25.0, 35.0), (0.12, 0.6), USUAL),
     "degenerate": Tier((3.0, 15.0), (0.15, 1.0), DEGENERATE, version=3),
-    # Two different places altogether, and a transform that says so: hundreds of metres apart.
+    # Two entirely different places, and a transform that says so: hundreds of metres apart.
     "disjoint": Tier((300.0, 600.0), (0.0, 0.0), USUAL),
 }
 

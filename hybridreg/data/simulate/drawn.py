@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Draws one pair: scene, stands, two scans, a photograph, the truth."""
+"""Generates one pair: scene, sensor poses, two scans, a camera image, the true pose."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybridreg.data.simulate.difficulty import TIERS, Tier, tier_named
-from hybridreg.data.simulate.sensing.camera import Camera, photograph
+from hybridreg.data.simulate.sensing.camera import Camera, render_image
 from hybridreg.data.simulate.sensing.caster import Part, World
 from hybridreg.data.simulate.sensing.jpeg import encode
 from hybridreg.data.simulate.sensing.light import Light
@@ -42,7 +42,7 @@ class Drawn:
 
 @dataclass(frozen=True)
 class _Streams:
-    """One random stream for each part, so that a draw more in one part leaves the others as they were."""
+    """One random stream for each part, so that one more draw in one part leaves the others unchanged."""
 
     scene: np.random.Generator
     stands: np.random.Generator
@@ -64,7 +64,7 @@ def _pick(table: dict[str, float], rng: np.random.Generator) -> str:
 def draw(tier: str, number: int, source: Sensor | None = None, target: Sensor | None = None) -> Drawn:
     """The pair of that tier and number: the same on every machine, alone or in a run.
 
-    Attempts follow one another until the measured overlap lies in the tier's range; the nearest one stays.
+    Attempts are repeated until the measured overlap lies in the tier's range; otherwise the nearest one is kept.
     """
     rules = tier_named(tier)
     best: tuple[float, Drawn] | None = None
@@ -103,7 +103,7 @@ def _common(tier: Tier, sensors: tuple[Sensor, Sensor], streams: _Streams) -> Dr
     still = Part(Mesh.merge(layout.still))
     stands = choose_stands(layout, World([still]), tier, sensors, streams.stands)
     bodies = [_body(layout, stand) for stand in stands]
-    together = streams.stands.random() < 0.3  # two vehicles at a time, else one that comes back
+    together = streams.stands.random() < 0.3  # two vehicles at the same time, or one that comes back
     at_source = _world(still, layout.at_source + (bodies if together else bodies[:1]))
     at_target = _world(still, layout.at_target + (bodies if together else bodies[1:]))
     T_world_source, T_world_target = (stand.T_world_sensor for stand in stands)
@@ -135,7 +135,7 @@ def _disjoint(tier: Tier, sensors: tuple[Sensor, Sensor], streams: _Streams) -> 
 
 
 def _picture(world: World, layout: Layout, T_world_source: np.ndarray, rng: np.random.Generator) -> bytes:
-    """JPEG, as cameras deliver it; drawn pictures pass through it too, so that files read back identically."""
+    """JPEG, as cameras deliver it; generated images pass through it too, so that files read back identically."""
     camera = Camera.near(T_world_source, rng)
-    picture = photograph(world, layout.surface, camera, Light.draw(rng), rng)
+    picture = render_image(world, layout.surface, camera, Light.draw(rng), rng)
     return encode(picture, int(rng.integers(72, 93)))

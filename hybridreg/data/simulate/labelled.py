@@ -16,7 +16,7 @@ from hybridreg.pair import LabelledPair, Pair
 
 
 def to_labelled(drawn: Drawn, id: str, voxel: float | None = None) -> LabelledPair:
-    """`drawn` with its picture decoded; `voxel` thins the clouds to one measured point per cube of that edge."""
+    """`drawn` with its image decoded; `voxel` thins the clouds to one measured point per voxel of that edge."""
     clouds = [thinned(cloud, voxel) for cloud in (drawn.source, drawn.target)]
     pair = Pair(
         source=PointCloud.of(clouds[0], name=f"{id} source", sensor=drawn.source_sensor),
@@ -29,7 +29,7 @@ def to_labelled(drawn: Drawn, id: str, voxel: float | None = None) -> LabelledPa
 
 
 def pair_id(split: str, tier: str, seed: int, index: int) -> str:
-    """`sim:test/near/1/17`: what `pair` needs to draw it again."""
+    """`sim:test/near/1/17`: what `pair` needs to generate it again."""
     return f"sim:{split}/{tier}/{seed}/{index}"
 
 
@@ -43,7 +43,7 @@ def pair(
     source: Sensor | None = None,
     target: Sensor | None = None,
 ) -> LabelledPair:
-    """Draw one simulated pair; the same arguments give the same bytes, alone or in a run.
+    """Generate one simulated pair; the same arguments give the same bytes, alone or in a run.
 
     Parameters
     ----------
@@ -52,7 +52,7 @@ def pair(
     seed, index, split
         Which pair; the splits "train", "val" and "test" never share a scene.
     voxel : float, optional
-        Thin both clouds to one point per cube of this edge in metres.
+        Thin both clouds to one point per voxel of this edge in metres.
     source, target : Sensor, optional
         Use these instead of drawing them from the table.
 
@@ -74,7 +74,7 @@ def pairs(
     start: int = 0,
     step: int = 1,
 ) -> Iterator[LabelledPair]:
-    """Simulated pairs without end: `pair(tier, ..., index)` for index = start, start + step, ...
+    """An endless sequence of simulated pairs: `pair(tier, ..., index)` for index = start, start + step, ...
 
     Worker k of n passes `start=k, step=n` and the workers' pairs together are those of a single run.
     """

@@ -50,7 +50,7 @@ def write_pair(folder: Path, drawn: Drawn, facts: dict[str, Any], voxel: float |
 
 
 def _write_cloud(path: Path, points: np.ndarray, small: bool) -> None:
-    # LZMA takes 0.1 s for a thinned cloud and 1 s for a whole one: there it would cost more than the drawing.
+    # LZMA takes 0.1 s for a thinned cloud and 1 s for a whole one: there it would cost more than the simulation.
     method = zipfile.ZIP_LZMA if small else zipfile.ZIP_DEFLATED
     with zipfile.ZipFile(path, "w", method) as archive, archive.open("xyz.npy", "w") as member:
         np.lib.format.write_array(member, np.asfortranarray(points), allow_pickle=False)
@@ -94,12 +94,12 @@ def read_pair(folder: Path) -> LabelledPair:
 
 
 def write_one(out: Path, tier: str, split: str, seed: int, index: int, voxel: float | None) -> Path:
-    """Draw pair `index` and write it below `out`; a pair that lies there whole already is kept.
+    """Generate pair `index` and write it below `out`; a complete pair that is already there is kept.
 
     Raises
     ------
     ValueError
-        Where the pair that lies there was thinned otherwise, or made by another version.
+        Where the pair that is there was thinned differently, or made by another version.
     """
     folder = out / f"{tier}-{split}-{seed}-{index:06d}"
     if (folder / "meta.json").is_file():
@@ -136,7 +136,7 @@ def write_pairs(
 ) -> Iterator[Path]:
     """Write `pairs` pairs below `out`, yielding each folder as it is done, in order.
 
-    An interrupted run goes on where it stopped. `voxel=0.25` makes a pair some 140 kB, 3 bytes a point.
+    An interrupted run continues where it stopped. With `voxel=0.25` a pair takes some 140 kB, 3 bytes a point.
 
     Raises
     ------
@@ -160,7 +160,7 @@ def write_pairs(
 def _written(
     out: Path, tier: str, split: str, seed: int, pairs: int, voxel: float | None, workers: int
 ) -> Iterator[Path]:
-    # A folder may take several tiers at a time, but no pair two writers.
+    # A folder may be written for several tiers at a time, but no pair by two writers.
     out.mkdir(parents=True, exist_ok=True)
     with folder_lock(out, f"{tier}-{split}-{seed}"):
         jobs = ((out, tier, split, seed, index, voxel) for index in range(pairs))

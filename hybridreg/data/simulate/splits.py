@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Which pair numbers belong to which split: ranges that cannot overlap."""
+"""Which pair numbers belong to which split: disjoint ranges."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ SPLITS = {
 
 
 def pair_number(split: str, seed: int, index: int) -> int:
-    """The number that alone decides pair `index` of `seed` in `split`.
+    """The number that alone determines pair `index` of `seed` in `split`.
 
     Raises
     ------

@@ -1,1 +1,2 @@
 # SPDX-License-Identifier: MIT
+"""Readers of cloud and image formats, one file each."""

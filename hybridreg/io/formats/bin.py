@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Headerless float32 rows: three numbers a point (PointNet's kind), four (KITTI), five (nuScenes) or six (Waymo)."""
+"""Headerless float32 rows: three numbers a point (as PointNet has), four (KITTI), five (nuScenes) or six (Waymo)."""
 
 from __future__ import annotations
 
@@ -11,31 +11,36 @@ from hybridreg.io.record_fields import stack_axes
 from hybridreg.io.signatures import looks_like_text
 
 _WIDTHS = (3, 4, 5, 6)
-_KITTI, _NUSCENES = 4, 5
-_FARTHEST = 1e7  # metres: beyond any map grid, while bytes that are no coordinates reach 1e38
+_KITTI = 4  # numbers a row
+_NUSCENES = 5
+_FARTHEST = 1e7  # metres: beyond any map grid, while bytes that are not coordinates go up to 1e38
 _MOST_RINGS = 1024
 _TOLERATED = 0.01  # share of rows that may contradict a layout
-_NO_HEADER = "this format has no header to ask, so convert it to .npy with one point (x, y, z) a row"
-# Numbers looked at to tell a width. Columns differ from all numbers together when their distributions lie further apart
-# than this many times what chance makes of equal ones, and by this much in all.
-_LOOKED_AT, _CHANCE, _LEAST = 120_000, 2.5, 0.06
+_NO_HEADER = (
+    "this format has no header to tell its layout, so convert it to .npy with one point (x, y, z) a row"
+)
+_LOOKED_AT = 120_000  # numbers sampled to find the width
+# A column differs from all numbers together when their distributions are further apart than both.
+_CHANCE = 2.5  # times the distance expected by chance; by hand
+_LEAST = 0.06  # distance of distributions (Kolmogorov and Smirnov's); by hand
 # A width explains the numbers as well as the best one from this share of its contrast on.
 _AS_GOOD = 0.9
 _BLOCK = 60  # numbers, a multiple of every width
 
 
 def parse_bin(data: bytes, name: str) -> NDArray[np.float64]:
-    """Read x, y and z of float32 rows of three to six numbers; what follows z is left out. Shape (N, 3).
+    """Read x, y and z of float32 rows of three to six numbers; values after z are ignored. Shape (N, 3).
 
-    Only at the right width do columns differ: x spreads otherwise than z, an intensity otherwise than both, while at
-    a wrong width each column is the same mixture of all. The narrowest width at which they differ most is taken. Where
-    none makes them differ, the file's size, the values (is the fifth a ring's number, the fourth an intensity?) and
-    the name (five for `.pcd.bin`) decide between four and five; where all that allows both, the file is refused.
+    Only at the right width do columns differ: x is distributed differently from z, an intensity differently from both,
+    while at a wrong width each column is the same mixture of all. The narrowest width at which they differ most is
+    taken. Where none makes them differ, the file's size, the values (is the fifth a ring number, the fourth an
+    intensity?) and the name (five for `.pcd.bin`) decide between four and five; where that allows both, the file is
+    refused.
 
     Raises
     ------
     ValueError
-        Text, a size or values that fit no width, or several.
+        Text; a size or values that fit no width, or several.
     """
     if looks_like_text(data):
         raise fault(name, "is text, not float32 rows", "rename it to end in .txt")
@@ -60,7 +65,7 @@ def _rows(data: bytes, width: int) -> NDArray[np.float32]:
 
 
 def _width_by_columns(data: bytes) -> tuple[int, bool]:
-    """The narrowest width at which columns differ as much as at any, and whether more than by chance."""
+    """The narrowest width at which columns differ as much as at any other, and whether by more than chance."""
     numbers = np.frombuffer(data, dtype="<f4", count=len(data) // 4)
     if len(numbers) > _LOOKED_AT:  # whole rows of every width, from all over the file
         blocks = numbers[: len(numbers) // _BLOCK * _BLOCK].reshape(-1, _BLOCK)
@@ -69,7 +74,7 @@ def _width_by_columns(data: bytes) -> tuple[int, bool]:
     best = max(contrasts.values())
     chance = _CHANCE / np.sqrt(max(len(numbers) // max(_WIDTHS), 1))
     width = next(width for width, contrast in contrasts.items() if contrast >= _AS_GOOD * best)
-    # Of few points the contrast at twice the width is the larger by chance.
+    # With few points the contrast at twice the width may be larger by chance.
     width = 3 if width == 6 and _halves_agree(numbers) else width
     return width, best >= max(chance, _LEAST)
 
@@ -117,7 +122,7 @@ def _width_by_values(data: bytes, possible: list[int], likely: int, name: str) -
         raise fault(name, f"its {len(data)} bytes are {counts} numbers, and several look right", _NO_HEADER)
     if fits:
         return fits[0]
-    if 3 in possible:  # columns without any difference, not one of them an intensity: coordinates alone
+    if 3 in possible:  # columns that do not differ, none of them an intensity: coordinates only
         return 3
     return _NUSCENES if name.lower().endswith(".pcd.bin") and _NUSCENES in possible else possible[0]
 
@@ -141,7 +146,7 @@ def _refuse_implausible(rows: NDArray[np.float32], name: str) -> None:
     if width not in (_KITTI, _NUSCENES):
         return
     negative = rows[rows[:, 3] < 0, 3]
-    # A constant is a sensor's "no intensity"; varied negative numbers are coordinates out of step.
+    # A constant means that the sensor gives no intensity; varying negative numbers are misaligned coordinates.
     if len(negative) > _TOLERATED * len(rows) and negative.min() < negative.max():
         problem = f"read as rows of {width} float32, {len(negative)} of {len(rows)} intensities are negative"
         raise fault(name, problem, f"it has another layout: {_NO_HEADER}")

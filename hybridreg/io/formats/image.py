@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Photographs in one form: (H, W, 3), uint8, RGB."""
+"""Camera images in one form: (H, W, 3), uint8, RGB."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ from hybridreg.io.signatures import kind_of
 from hybridreg.io.whole_files import read_whole
 from hybridreg.runtime.optional_packages import load
 
-_NOT_AN_IMAGE = "give a photograph that an image viewer opens (.png, .jpg, .tif, .bmp, .webp)"
-# The largest sensors of telephones have 200 million; decoded they take 0.6 GB, twice that on the way.
+_NOT_AN_IMAGE = "give an image that an image viewer opens (.png, .jpg, .tif, .bmp, .webp)"
+# The largest phone cameras have 200 million; decoded they take 0.6 GB, twice that while decoding.
 _MOST_PIXELS = 210_000_000
 _ROWS = 256
 _ROUNDING = 1e-6  # by which a float image may leave [0, 1]
 
 
 def read_image(path: str | os.PathLike[str]) -> NDArray[np.uint8]:
-    """Read a photograph, turned upright as its EXIF orientation says.
+    """Read an image, turned upright by its EXIF orientation.
 
     Parameters
     ----------
@@ -42,7 +42,7 @@ def read_image(path: str | os.PathLike[str]) -> NDArray[np.uint8]:
     FileNotFoundError, IsADirectoryError
         Nothing, or a folder, lies at `path`.
     ValueError
-        The file is no image, is truncated, or has more than 210 million pixels, which are not decoded then.
+        The file is not an image, is truncated, or has more than 210 million pixels (it is then not decoded).
     """
     name = str(path)
     data = _checked(Path(path))
@@ -53,7 +53,7 @@ def read_image(path: str | os.PathLike[str]) -> NDArray[np.uint8]:
 
 
 def check_image(path: str | os.PathLike[str]) -> None:
-    """Refuse what is no photograph, is cut short, or has too many pixels, by its header alone.
+    """Refuse by its header alone what is not an image, is truncated, or has too many pixels.
 
     Raises
     ------
@@ -78,7 +78,7 @@ def _checked(path: Path) -> bytes:
         raise fault(
             name,
             problem,
-            f"make it smaller: {_MOST_PIXELS / 1e6:.0f} are read, networks look at less than one",
+            f"make it smaller: {_MOST_PIXELS / 1e6:.0f} are read, networks use less than one",
         )
     return data
 
@@ -90,7 +90,7 @@ def _undecodable(data: bytes, name: str) -> ValueError:
 
 
 def as_image(image: ArrayLike, name: str = "image") -> NDArray[np.uint8]:
-    """Bring pixels to the one form that all stages take.
+    """Convert pixels to the one form that all stages take.
 
     Parameters
     ----------

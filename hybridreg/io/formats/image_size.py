@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""How many pixels a photograph has, told by its header: a decoder allocates them all before anyone can object."""
+"""The number of pixels of an image from its header: a decoder allocates them all before it can be stopped."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ Size = tuple[int, int]  # rows, columns
 
 
 def image_size(data: bytes) -> Size | None:
-    """Rows and columns of the image in `data`; None where it is of no kind that OpenCV decodes, or cut short.
+    """Rows and columns of the image in `data`; None where OpenCV does not decode such files, or the file is truncated.
 
     Source: the headers as their formats' specifications give them (PNG, JPEG, TIFF 6, BMP, WebP, GIF, JPEG 2000, AVIF,
     Netpbm, Radiance, OpenEXR, Sun raster).
@@ -85,7 +85,7 @@ def _tiff(data: bytes) -> Size:
 
 
 def _jpeg_2000(data: bytes) -> Size:
-    # The size in the stream itself: the box around it may tell another.
+    # The size in the stream itself: the box around it may give another.
     columns, rows = struct.unpack_from(">II", data, data.index(b"\xff\x4f\xff\x51") + 8)
     return rows, columns
 

@@ -15,19 +15,19 @@ from hybridreg.io.formats.las_units import in_metres
 from hybridreg.io.record_fields import stack_axes
 from hybridreg.runtime.optional_packages import load
 
-_CHUNK = 64 * 2**20  # bytes, so that memory grows with what a LAZ file holds, not with what it promises
+_CHUNK = 64 * 2**20  # bytes, so that memory grows with what a LAZ file holds, not with what it claims
 
 
 def parse_las(data: bytes, name: str) -> NDArray[np.float64]:
     """Read x, y and z of a LAS or LAZ file, scaled and offset as its header says; shape (N, 3), metres.
 
-    Feet are converted with a warning, and degrees refused, where the coordinate reference system tells them.
+    Where the coordinate reference system says so, feet are converted with a warning and degrees refused.
     """
     laspy = _laspy()
     promise = check_las_header(data, name)
     chunk_points = max(_CHUNK // promise.point_size, 1)
     with foreign_parser(name, "a LAS or LAZ file"):
-        # One thread: lazrs' parallel reader allocates what a damaged table of chunks says, and dies of it.
+        # One thread: lazrs' parallel reader allocates whatever a damaged chunk table says, and crashes.
         backends = [laspy.LazBackend.Lazrs, laspy.LazBackend.Laszip]
         with laspy.open(io.BytesIO(data), laz_backend=backends, read_evlrs=False) as reader:
             records = list(reader.header.vlrs)

@@ -2,7 +2,7 @@
 """What a LAS header promises, checked against the file before laspy believes it.
 
 laspy loops over the promised number of records and allocates the promised points; lazrs, behind it, allocates
-the promised table of chunks and ends the whole process when it cannot. One damaged byte would do.
+the promised table of chunks and ends the whole process when it cannot. One damaged byte would be enough.
 """
 
 from __future__ import annotations
@@ -50,9 +50,9 @@ def check_las_header(data: bytes, name: str) -> LasPromise:
 
 
 def _check_chunk_table(data: bytes, start: int, point_size: int, name: str) -> None:
-    """Refuse a LAZ chunk table that is not there, or that lists more chunks than the file has room for.
+    """Refuse a LAZ chunk table that is missing, or that lists more chunks than the file has room for.
 
-    Source: the LASzip format. The data begin with the table's place (-1: it stands in the last 8 bytes); the
+    Source: the LASzip format. The data begin with the table's position (-1: the position is in the last 8 bytes); the
     table begins with a version and its length. A chunk begins with one point that is not compressed.
     """
     place = int.from_bytes(data[start : start + 8], "little", signed=True)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The unit of a LAS file's coordinates, as its coordinate reference system tells it."""
+"""The unit of a LAS file's coordinates, from its coordinate reference system."""
 
 from __future__ import annotations
 
@@ -14,10 +14,14 @@ from hybridreg.io.faults import fault
 
 Array = NDArray[np.float64]
 
-_FOOT, _SURVEY_FOOT = 0.3048, 1200 / 3937
+_FOOT = 0.3048  # metres, by definition
+_SURVEY_FOOT = 1200 / 3937  # metres, by definition
 # EPSG's codes of lengths, and the GeoTIFF keys that hold one: of x and y, of z; the key of the kind of system.
 _LENGTHS = {9001: 1.0, 9002: _FOOT, 9003: _SURVEY_FOOT}
-_ACROSS, _UP, _MODEL, _GEOGRAPHIC = 3076, 4099, 1024, 2
+_ACROSS = 3076  # ProjLinearUnitsGeoKey
+_UP = 4099  # VerticalUnitsGeoKey
+_MODEL = 1024  # GTModelTypeGeoKey
+_GEOGRAPHIC = 2  # ModelTypeGeographic
 _UNIT = re.compile(r'UNIT\s*\[\s*"[^"]*"\s*,\s*([0-9.eE+-]+)')
 
 
@@ -53,13 +57,13 @@ def in_metres(points: Array, records: Any, name: str) -> Array:
 
 
 def told(records: Any) -> Unit:
-    """What the records of a header tell; metres where they tell nothing that is understood."""
+    """The unit that the records of a header give; metres where they give none that is understood."""
     for record in records:
         keys, text = getattr(record, "geo_keys", None), getattr(record, "string", None)
         if getattr(record, "record_id", None) == 2112 and isinstance(text, str) and text.strip("\0 "):
             return _of_text(text)
         if keys is not None:
-            # A value that lies elsewhere has a tag; those asked for here never do.
+            # A value that is stored elsewhere has a tag; those read here never are.
             values = {key.id: key.value_offset for key in keys if key.tiff_tag_location == 0}
             across = _LENGTHS.get(values.get(_ACROSS, 9001), 1.0)
             up = _LENGTHS.get(values.get(_UP, 9001), 1.0) if _UP in values else across

@@ -18,12 +18,12 @@ def lzf_decompress(data: bytes, size: int) -> bytes:
         The compressed stream: literal runs of up to 32 bytes (control byte below 32), and copies of 3 to 264
         bytes from up to 8192 bytes back (format of Lehmann's liblzf).
     size : int
-        How many bytes must come out. Memory grows with what does come out, never with this promise.
+        Number of bytes that must result. Memory grows with the actual output, never with this promise.
 
     Raises
     ------
     ValueError
-        The stream is damaged, or gives another number of bytes.
+        The stream is damaged, or yields another number of bytes.
     """
     try:
         return _by_imagecodecs(data, size)

@@ -21,9 +21,9 @@ def parse_npy(data: bytes, name: str) -> NDArray[np.float64]:
 
 
 def array_of_npy(data: bytes, name: str) -> NDArray[np.generic]:
-    """The array in the npy content `data`, its promised size checked against the bytes that are there."""
+    """The array in the npy content `data`; its promised size is checked against the bytes present."""
     if not data.startswith(b"\x93NUMPY"):
-        what = "is a Python pickle, which could run code" if data[:1] == b"\x80" else "is no npy file"
+        what = "is a Python pickle, which could run code" if data[:1] == b"\x80" else "is not an npy file"
         raise fault(name, f"{what} (it begins with {shorten(data[:8])})", _SAVE_PLAIN)
     shape, fortran, dtype, start = npy_header(data, name)
     if dtype.hasobject:

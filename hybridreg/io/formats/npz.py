@@ -14,8 +14,9 @@ from hybridreg.io.faults import fault, foreign_parser
 from hybridreg.io.formats.npy import array_of_npy, npy_header
 
 _KEYS = ("xyz", "points", "arr_0")
+_MODEST = 2**28  # bytes that are unpacked in any case
 # Coordinates hardly compress (up to 20 times on a coarse grid); noise of zeros compresses a thousandfold.
-_MODEST, _MOST_EXPANSION = 2**28, 200
+_MOST_EXPANSION = 200
 _LONGEST_HEADER = 16384  # numpy itself refuses headers above 10000 bytes
 
 
@@ -33,7 +34,7 @@ def parse_npz(data: bytes, name: str) -> NDArray[np.float64]:
 
 
 def _refuse_bomb(member: zipfile.ZipInfo, label: str) -> None:
-    # zipfile unpacks no more than the directory promises, so the promise is what has to be believable.
+    # zipfile unpacks no more than the directory promises, so it is the promise that has to be plausible.
     packed, unpacked = member.compress_size, member.file_size
     if unpacked > _MODEST and unpacked > _MOST_EXPANSION * packed:
         raise fault(label, f"would unpack from {packed} to {unpacked} bytes, as no cloud does")

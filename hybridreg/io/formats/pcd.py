@@ -20,7 +20,7 @@ _MOST_EXPANSION = 88  # three bytes of LZF make at most 264
 def parse_pcd(data: bytes, name: str) -> NDArray[np.float64]:
     """Read x, y and z of a PCD file: ascii, binary or binary_compressed; shape (N, 3).
 
-    The points stay in the frame in which they are stored; VIEWPOINT, the sensor's place in it, is told by
+    The points stay in the frame in which they are stored; VIEWPOINT, the sensor's position in it, is read by
     `pcd_viewpoint`. An organised cloud keeps its
     rows in order, empty pixels as NaN. Source: the Point Cloud Library's description of PCD 0.7.
     """
@@ -37,7 +37,7 @@ def parse_pcd(data: bytes, name: str) -> NDArray[np.float64]:
 
 
 def pcd_viewpoint(data: bytes, name: str) -> NDArray[np.float64] | None:
-    """Where the sensor stood, (3,) in the frame of the points; None where the header tells nothing but the origin."""
+    """Where the sensor stood, (3,) in the frame of the points; None where the header gives only the origin."""
     place = parse_pcd_header(data, name).viewpoint
     return None if place is None else np.array(place)
 

@@ -31,7 +31,7 @@ class PcdHeader:
     points: int
     encoding: str
     body: int  # the first byte after the header
-    viewpoint: tuple[float, float, float] | None  # the sensor's place; None where the header does not tell
+    viewpoint: tuple[float, float, float] | None  # the sensor's position; None where it is not given
 
     @property
     def sizes(self) -> tuple[int, ...]:
@@ -102,7 +102,7 @@ def _count(text: str, name: str) -> int:
 
 def _viewpoint(values: list[str], name: str) -> tuple[float, float, float] | None:
     # Translation and quaternion (w x y z) of the sensor in the frame of the points. Nearly every writer fills in the
-    # origin for want of better, so that says nothing.
+    # origin by default, so that says nothing.
     try:
         x, y, z, *turn = (float(value) for value in values)
     except ValueError:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""PLY files: the coordinates of the `vertex` element, whatever stands before, beside or after them."""
+"""PLY files: the coordinates of the `vertex` element, whatever comes before, beside or after them."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def _ascii_vertices(
 
 
 def _without_lists(row: str, vertex: Element, name: str) -> str:
-    # A list before x moves x to another place in each row; one word in its stead puts the columns right.
+    # A list before x moves x to another place in each row; one word in its place restores the columns.
     words = row.split()
     kept: list[str] = []
     place = 0
@@ -100,8 +100,8 @@ def _binary_vertices(
 def _walk(element: Element, data: bytes, start: int, order: str, name: str) -> Iterator[list[int]]:
     """For each row, the byte where each property begins, and the byte after the row.
 
-    Row by row in Python, for rows of unequal length only. It stops at the first row that leaves the file, so
-    an absurd count in the header costs nothing.
+    Row by row in Python, for rows of unequal length only. It stops at the first row that leaves the file, so an absurd
+    count in the header does no harm.
     """
     for row in range(element.count):
         places = [start]

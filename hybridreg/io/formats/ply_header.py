@@ -29,7 +29,7 @@ class Property:
 
 @dataclass(frozen=True, kw_only=True)
 class Element:
-    """`count` rows of the same properties: the vertices, the faces, or whatever a program added."""
+    """`count` rows of the same properties: the vertices, the faces, or whatever else a program added."""
 
     name: str
     count: int
@@ -42,7 +42,7 @@ class Element:
 
 @dataclass(frozen=True, kw_only=True)
 class PlyHeader:
-    """Elements in file order, and the place of the first byte after the header."""
+    """Elements in file order, and the position of the first byte after the header."""
 
     order: str  # "<" or ">", empty for ascii
     elements: tuple[Element, ...]
@@ -74,7 +74,7 @@ def parse_ply_header(data: bytes, name: str) -> PlyHeader:
 
 
 def _header_lines(data: bytes, name: str) -> tuple[list[str], int]:
-    # The first line tells how lines end, so that a binary body that begins with a newline's byte stays whole.
+    # The first line shows how lines end, so that a binary body that begins with a newline byte is kept whole.
     ending = b"\r\n" if data.startswith(b"ply\r\n") else b"\r" if data.startswith(b"ply\r") else b"\n"
     stop = data.find(ending + b"end_header")
     if stop < 0:
@@ -110,6 +110,6 @@ def _property(words: list[str], name: str) -> Property:
     is_list = types[:1] == ["list"]
     codes = [_TYPES.get(word, "") for word in types[is_list:]]
     if len(codes) != 1 + is_list or "" in codes or (is_list and codes[0].startswith("f")):
-        problem = f"its header line {shorten(' '.join(words))} is no property of a known type"
+        problem = f"its header line {shorten(' '.join(words))} is not a property of a known type"
         raise fault(name, problem, f"known types are {', '.join(_TYPES)}")
     return Property(name=label, code=codes[-1], length_code=codes[0] if is_list else "")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Plain text clouds: one point a line, whatever separates its numbers and whatever stands above them."""
+"""Plain text clouds: one point a line, with any separator and any header lines."""
 
 from __future__ import annotations
 
@@ -24,13 +24,13 @@ def parse_text(data: bytes, name: str) -> NDArray[np.float64]:
 
     Lines that begin with `#`, `//`, `%` or `;` are comments. A first row of names (CloudCompare puts it
     behind a comment mark) tells which columns are x, y and z, and perhaps their unit; otherwise the first three are. A
-    first row of one whole number (PTS, XYZ) is the count of the points and must agree. A comma is a decimal point
+    first row of one whole number (PTS, XYZ) is the number of points and must be right. A comma is a decimal point
     where something else separates the numbers.
 
     Raises
     ------
     ValueError
-        No text, no rows, a row that is no numbers, a count that is wrong, or a first column that counts the rows.
+        No text, no rows, a row without numbers, a wrong count, or a first column of row numbers.
     """
     if looks_binary(data):
         raise fault(name, "is not plain text: it holds zero bytes", "save it as UTF-8 text")
@@ -61,7 +61,7 @@ def parse_text(data: bytes, name: str) -> NDArray[np.float64]:
     )
     if not named and counts_up(points[:, 0]) and len(rows[0].split(delimiter)) > 3:
         cure = "name the columns in a first row, such as: id x y z"
-        raise fault(name, "its first column counts the rows, it is no coordinate", cure)
+        raise fault(name, "its first column is a row number, not a coordinate", cure)
     return _in_metres(points, axes, lines[:first], name)
 
 

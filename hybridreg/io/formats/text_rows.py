@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Coordinates out of rows of text, and which row is to blame where they are no numbers."""
+"""Coordinates from rows of text, and which row is at fault where a value is not a number."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from hybridreg.io.faults import fault, shorten
 
 
 def text_lines(data: bytes) -> list[str]:
-    """The lines that hold something; bytes that are no ASCII survive in comments and names as Latin-1."""
+    """The lines that are not empty; bytes that are not ASCII survive in comments and names as Latin-1."""
     lines = data.decode("latin-1").replace("\r", "\n").split("\n")
     return [line for line in lines if line and not line.isspace()]
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What `torch.save` wrote, read without running anything that a file carries."""
+"""Files of `torch.save`, read without running any code that a file carries."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def parse_torch(data: bytes, name: str) -> Any:
     try:
         with _settings():
             return torch.load(io.BytesIO(data), map_location="cpu", weights_only=True)
-    except Exception as error:  # torch raises half a dozen types for a damaged file
+    except Exception as error:  # torch raises half a dozen exception types for a damaged file
         problem = f"is damaged, or nothing that can be read safely ({_reason(error)})"
         raise fault(name, problem, _TRUSTED) from error
 

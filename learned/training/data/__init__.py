@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: MIT
-"""What a training step looks at: sources, prepared pairs, augmentation, order."""
+"""Training data: sources, prepared pairs, augmentation, order."""

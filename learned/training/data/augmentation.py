@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Augmentation that leaves every index of a pyramid as it is: motions, noise, light (docs/methods.md 2.5)."""
+"""Augmentation that keeps every index of a pyramid: motions, noise, light (docs/methods.md 2.5)."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, kw_only=True)
 class Augmentation:
-    """How a training pair is disturbed.
+    """How a training pair is augmented.
 
     Attributes
     ----------
-    rotation : "yaw" turns about the vertical by up to 180 degrees and tilts by up to ``tilt`` degrees; "full" draws
-        three Euler angles of the whole circle, as GeoTransformer does
-    clouds : turn both clouds independently, or one that is drawn
+    rotation : "yaw" rotates about the vertical by up to 180 degrees and tilts by up to ``tilt`` degrees; "full" draws
+        three Euler angles over the full circle, as GeoTransformer does
+    clouds : rotate both clouds independently, or a random one
     shift : largest shift along each axis, metres, of both clouds
     jitter : half the width of the noise on each coordinate, metres
     scale : range of a common factor on both clouds; anything but 1 changes the neighbours, so it needs pairs that
@@ -46,17 +46,17 @@ class Augmentation:
 
     @property
     def rescales(self) -> bool:
-        """Does it change the neighbours?"""
+        """Whether it changes the neighbours."""
         return self.scale != (1.0, 1.0)
 
     @property
     def upright(self) -> bool:
-        """Does it only turn clouds about the vertical and shift them?"""
+        """Whether it only rotates clouds about the vertical and shifts them."""
         tilts = self.rotation == "full" or (self.rotation == "yaw" and self.tilt != 0.0)
         return not tilts and self.jitter == 0.0 and not self.rescales
 
     def draw_scale(self, rng: np.random.Generator) -> float:
-        """A factor from the range; the generator is left alone where there is none to choose from."""
+        """A factor from the range; the generator is not used where there is nothing to choose."""
         return float(rng.uniform(self.scale[0], self.scale[1])) if self.rescales else 1.0
 
 
@@ -74,7 +74,7 @@ def draw_motions(augmentation: Augmentation, rng: np.random.Generator) -> tuple[
 def move_pyramid(
     pyramid: Pyramid, motions: tuple[Array, Array], jitter: float, rng: np.random.Generator
 ) -> Pyramid:
-    """The pyramid with the points of each cloud moved at all stages; neighbours stay what they were."""
+    """The pyramid with the points of each cloud moved at all stages; neighbours stay the same."""
     matrices = [torch.from_numpy(motion).float() for motion in motions]
     noise = torch.Generator().manual_seed(int(rng.integers(2**62)))
     moved = []

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Whose data a recipe learns from: the folders that it leaves open, and data put in its own's place."""
+"""The data of a recipe: folders that it leaves open, and data that replaces its own."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ _OPEN = re.compile(r"\{(\w[\w-]*)\}")
 
 
 def with_data(recipe: Recipe, texts: Sequence[str]) -> Recipe:
-    """The recipe on the data that a user names.
+    """The recipe with the data that a user names.
 
     Parameters
     ----------
     texts
-        ``NAME=TEXT`` puts TEXT where the recipe has ``{NAME}``, in training and validation data; or else in the
-        place of the training source of that name. Texts without a name replace all training sources.
+        ``NAME=TEXT`` replaces ``{NAME}`` in the recipe's training and validation data by TEXT, or otherwise the
+        training source of that name. Texts without a name replace all training sources.
     """
     named = {name: text for name, equals, text in map(_parted, texts) if equals}
     known = missing_data(recipe)
@@ -40,7 +40,7 @@ def require_data(recipe: Recipe) -> None:
     Raises
     ------
     ValueError
-        It tells the option that is missing.
+        The message names the missing option.
     """
     missing = missing_data(recipe)
     if missing:

@@ -19,7 +19,7 @@ from hybridreg.learned.training.recipe import Phase
 class FrozenFeatures:
     """The backbone's output by pair, in half precision: about 1 MB for 5,000 points.
 
-    ``active`` is `lasting` of the phase; where it is false nothing is kept and nothing known.
+    ``active`` is `lasting` of the phase; where it is false nothing is stored or found.
     """
 
     def __init__(self, network: RegistrationNetwork, active: bool) -> None:
@@ -27,7 +27,7 @@ class FrozenFeatures:
         self._known: dict[Hashable, Known] = {}
 
     def of(self, pair: Hashable, batch: Batch) -> Known | None:
-        """Features and evidence, float32 without a graph; None where they must be computed anew each time."""
+        """Features and evidence, float32 without a graph; None where they must be computed each time."""
         if not self._active:
             return None
         if pair not in self._known:
@@ -46,9 +46,8 @@ def _moved(known: Known, move: Callable[[Tensor], Tensor]) -> Known:
 
 
 def lasting(phase: Phase, augmentation: Augmentation, backbone: BackboneConfig) -> bool:
-    """Does each pair keep its features all through a phase?
+    """Whether each pair keeps its features throughout a phase.
 
-    A frozen backbone, kernel points that no turn about the vertical moves, and an augmentation that does no more
-    than such turns and shifts.
+    True for a frozen backbone, yaw-invariant kernel points, and an augmentation of yaw rotations and shifts only.
     """
     return phase.backbone_rate == 0 and backbone.kernel == "cylindrical" and augmentation.upright

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A data set as a run of training has opened it."""
+"""A data set opened for a training run."""
 
 from __future__ import annotations
 
@@ -48,15 +48,15 @@ class OpenedSource:
 
     @property
     def content(self) -> str:
-        """Changes when the pairs do; where nothing is kept, when their names do."""
+        """Changes with the pairs; where nothing is stored, with their names."""
         return f"{zlib.crc32(repr(self.fingerprints).encode()):08x}"
 
     def only(self, usable: tuple[int, ...]) -> Self:
-        """The source with these pairs alone."""
+        """The source with only these pairs."""
         return replace(self, usable=tuple(usable))
 
     def prepare(self, index: int) -> str | None:
-        """Put pair ``index`` into the cache; why it cannot be used, or None.
+        """Put pair ``index`` into the cache; returns why it cannot be used, or None.
 
         Raises
         ------
@@ -65,7 +65,7 @@ class OpenedSource:
         """
         try:
             self.fill(index)
-        except NotKept:  # a full disk is no fault of the pair
+        except NotKept:  # a full disk is not the pair's fault
             raise
         except Exception as error:  # one bad pair must not end the run: it is named and left out
             return " ".join(f"{type(error).__name__}: {error}".split())
@@ -77,15 +77,15 @@ class OpenedSource:
 
     @abstractmethod
     def is_prepared(self, index: int) -> bool:
-        """Does the cache hold pair ``index``?"""
+        """Whether the cache holds pair ``index``."""
 
     @abstractmethod
     def sample(self, pair: int, number: int, how: Augmentation, rng: np.random.Generator) -> Any:
-        """Sample ``number`` of a phase: the pair ``usable[pair]``, disturbed."""
+        """Sample ``number`` of a phase: the pair ``usable[pair]``, augmented."""
 
 
 class LazyPair:
-    """A pair read when it is first needed: a cache that holds everything reads nothing."""
+    """A pair that is read when first needed: with a complete cache nothing is read."""
 
     def __init__(self, pairs: Sequence[LabelledPair], index: int) -> None:
         self._pairs, self._index = pairs, index
@@ -106,9 +106,9 @@ def opened(
     Parameters
     ----------
     rescales
-        Does an augmentation make what would be kept useless? Nothing is kept then.
+        Whether an augmentation would invalidate the stored tensors; nothing is then stored.
     told
-        Is the content of the files part of what the pairs are kept under? Not for a process that hears it from another.
+        Whether the content of the files is part of the cache keys. Not for a process that receives it from another.
 
     Raises
     ------

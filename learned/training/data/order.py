@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Which pair a sample shows: decided by the seed, the phase and the sample's number alone."""
+"""The pair of each sample, determined by the seed, the phase and the sample's number alone."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 
 class Order:
-    """Sources drawn by weight; within a source, every pair once before any of them comes again.
+    """Sources drawn by weight; within a source, every pair once before any is repeated.
 
     Parameters
     ----------
@@ -34,7 +34,7 @@ class Order:
         self._sizes, self._seed = tuple(sizes), tuple(seed)
         rng = np.random.default_rng([*seed, 0])
         self._source = rng.choice(len(sizes), size=samples, p=share / share.sum()).astype(np.int32)
-        # How often each sample's source came before it.
+        # How often each sample's source occurred before it.
         self._turn = np.zeros(samples, dtype=np.int64)
         for source in range(len(sizes)):
             mine = self._source == source

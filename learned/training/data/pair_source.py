@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A data set as training reads it: prepared pairs, from the disk where they were prepared before."""
+"""Training data of the default network: prepared pairs, read from disk where they were prepared before."""
 
 from __future__ import annotations
 
@@ -26,18 +26,18 @@ from hybridreg.learned.training.recipe import Recipe, Source
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class PairSource(OpenedSource):
-    """Pairs kept with everything that no rotation changes.
+    """Pairs stored with everything that is invariant to rotation.
 
     Attributes
     ----------
-    partner : how far a true partner may lie, voxels (`InfoNceConfig.partner`)
+    partner : largest distance of a true correspondence, voxels (`InfoNceConfig.partner`)
     """
 
     config: NetworkConfig
     partner: float
 
     def load(self, number: int, scale: float = 1.0) -> PreparedPair:
-        """Pair ``usable[number]``; a scale other than 1 is computed anew."""
+        """Pair ``usable[number]``; a scale other than 1 is computed each time."""
         index = self.usable[number]
         lazy = LazyPair(self.pairs, index)
         cache = self.cache if scale == 1.0 else TensorCache(None)
@@ -88,8 +88,8 @@ class PairSource(OpenedSource):
 def open_source(source: Source, recipe: Recipe, cache: Path, *, told: bool = True) -> PairSource:
     """Open a source; its pairs are not prepared yet, and all of them count as usable.
 
-    The content of their files is part of what they are kept under; ``told=False`` leaves it out, for a process that
-    hears it from another, as does data of which nothing is kept.
+    The content of their files is part of the cache keys; ``told=False`` leaves it out, for a process that receives it
+    from another; so does data of which nothing is stored.
 
     Raises
     ------

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""A pair with everything that no rotation changes: neighbours, input features, true overlaps, true partners."""
+"""A pair with everything that is invariant to rotation: neighbours, input features, true overlaps and
+correspondences."""
 
 from __future__ import annotations
 
@@ -21,7 +22,7 @@ from hybridreg.learned.pyramid.point_pyramid import Pyramid
 from hybridreg.learned.training.data.tensor_cache import Tensors
 from hybridreg.pair import LabelledPair
 
-# Raised when the prepared tensors change their meaning.
+# Incremented when the prepared tensors change their meaning.
 VERSION = 2
 
 
@@ -35,12 +36,12 @@ class PreparedPair:
     targets: Targets
     partners: tuple[
         Tensor, Tensor
-    ]  # (m,), (n,) int64: each fine point's true partner in the other cloud, or -1
+    ]  # (m,), (n,) int64: each fine point's true correspondence in the other cloud, or -1
     image: NDArray[np.uint8] | None
 
 
 def cloud_key(config: NetworkConfig, partner: float) -> tuple[object, ...]:
-    """What the cloud tensors of a pair depend on, beside the pair."""
+    """Everything besides the pair that its cloud tensors depend on."""
     backbone = config.backbone
     shape = [
         backbone.stages,
@@ -92,7 +93,7 @@ def true_partners(points: tuple[Tensor, Tensor], transform: Tensor, radius: floa
 
 
 def shrink_image(image: NDArray[np.uint8], height: int, width: int) -> Tensor:
-    """The image (h, w, 3) uint8 at the size at which it fits the network's frame."""
+    """The image (h, w, 3) uint8 at the size that fits the network's input."""
     import cv2
 
     rows, columns = letterboxed_size(image.shape[0], image.shape[1], height, width)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Samples of a phase: augmented pairs by number, read ahead by worker processes where wanted."""
+"""Samples of a phase: augmented pairs by number, optionally read ahead by worker processes."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class Sample:
-    """What a step works on."""
+    """The data of a training step."""
 
     number: int
     id: str
@@ -67,7 +67,7 @@ class Unusable:
 
 
 class PhaseSamples(Dataset[Any]):
-    """All samples of a phase by number; each has a random generator of its own, so that order does not matter."""
+    """All samples of a phase by number; each has its own random generator, so that order does not matter."""
 
     def __init__(
         self, sources: Sequence[OpenedSource], order: Order, augmentation: Augmentation, seed: Sequence[int]
@@ -91,7 +91,7 @@ class PhaseSamples(Dataset[Any]):
         return made
 
     def id_of(self, number: int) -> str:
-        """Name of the pair that a sample shows."""
+        """Name of a sample's pair."""
         source, pair = self.order[number]
         return self.sources[source].ids[self.sources[source].usable[pair]]
 
@@ -99,7 +99,7 @@ class PhaseSamples(Dataset[Any]):
 def augment(
     pair: PreparedPair, number: int, how: Augmentation, image: ImageConfig | None, rng: np.random.Generator
 ) -> Sample:
-    """A disturbed copy of a pair."""
+    """An augmented copy of a pair."""
     motions = draw_motions(how, rng)
     pyramid = move_pyramid(pair.pyramid, motions, how.jitter, rng)
     tensor = None
@@ -115,7 +115,7 @@ def augment(
 
 
 def undisturbed(pair: PreparedPair, image: ImageConfig | None) -> Sample:
-    """A pair as it is, for validation."""
+    """A pair without augmentation, for validation."""
     still = Augmentation(rotation="none", shift=0.0, jitter=0.0, light=0.0)
     return augment(pair, 0, still, image, np.random.default_rng(0))
 
@@ -125,8 +125,8 @@ def stream(
 ) -> Iterator[Sample | Example | Unusable]:
     """The samples of those numbers, in order; read ahead by ``loaders`` processes.
 
-    They come through pipes, as bytes: torch's own way goes through /dev/shm, and where that is small, as in a
-    container, it waits for ever.
+    They are sent through pipes, as bytes: torch uses /dev/shm, and where that is small, as in a container, it waits
+    forever.
 
     Warns
     -----
@@ -160,7 +160,7 @@ def _as_it_is(sample: Any) -> Any:
 
 
 def _begin(leader: int, _: int) -> None:
-    # A forked process that asks GNU's OpenMP for threads waits for ever for those that its parent had: so not even the
+    # A forked process that asks GNU's OpenMP for threads waits forever for those of its parent: so not even the
     # libraries that read the variable (`hybridreg.runtime.resources.n_threads`) may ask for two.
     os.environ["OMP_NUM_THREADS"] = "1"
     torch.set_num_threads(1)

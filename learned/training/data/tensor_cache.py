@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Tensors computed once and kept on disk, one file for each key."""
+"""Tensors computed once and stored on disk, one file for each key."""
 
 from __future__ import annotations
 
@@ -24,28 +24,28 @@ class NotKept(OSError):
 
 @dataclass(frozen=True)
 class TensorCache:
-    """A folder of safetensors files. The system's page cache is what keeps them in memory.
+    """A folder of safetensors files. The system's page cache keeps them in memory.
 
-    ``folder=None`` keeps nothing and computes each time.
+    ``folder=None`` stores nothing and computes each time.
     """
 
     folder: Path | None
 
     def path(self, key: object) -> Path:
-        """Where the tensors of a key lie."""
+        """The file of a key's tensors."""
         if self.folder is None:
             raise ValueError("this cache has no folder")
         name = hashlib.sha256(repr(key).encode()).hexdigest()[:32]
         return self.folder / name[:2] / f"{name[2:]}.safetensors"
 
     def has(self, key: object) -> bool:
-        """Are they there?"""
+        """Whether they are stored."""
         return self.folder is not None and self.path(key).is_file()
 
     def get(self, key: object, make: Callable[[], Tensors], *, must_keep: bool = True) -> Tensors:
-        """The tensors of a key, read or else made; a damaged file is made anew.
+        """The tensors of a key, read or computed; a damaged file is replaced.
 
-        ``must_keep=False`` gives them all the same where they cannot be written.
+        ``must_keep=False`` returns them even where they cannot be written.
 
         Raises
         ------

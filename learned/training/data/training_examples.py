@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Samples of the networks that make their own: clouds are disturbed first, batch and targets made of them after."""
+"""Samples of networks with their own examples: clouds are augmented first, then batch and targets are made."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ from hybridreg.learned.training.recipe import Recipe, Source
 from hybridreg.learned.true_pair import TruePair
 from hybridreg.pair import LabelledPair
 
-# Raised when the kept tensors change their meaning.
+# Incremented when the stored tensors change their meaning.
 VERSION = 1
 
 
 @dataclass(frozen=True, kw_only=True)
 class Example:
-    """What a step works on."""
+    """The data of a training step."""
 
     number: int
     id: str
@@ -43,13 +43,13 @@ class Example:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class ExampleSource(OpenedSource):
-    """Pairs kept as clouds and true poses; what the network called ``kind`` sees of them is made anew each time."""
+    """Pairs stored as clouds and true poses; the input of the network ``kind`` is computed each time."""
 
     kind: str
     config: Any
 
     def true_pair(self, number: int) -> TruePair:
-        """Pair ``usable[number]`` as it is."""
+        """Pair ``usable[number]`` without augmentation."""
         index = self.usable[number]
         lazy = LazyPair(self.pairs, index)
         return _restored(self.cache.get(self._key(index), lambda: _tensors(lazy.pair()), must_keep=False))
@@ -63,13 +63,14 @@ class ExampleSource(OpenedSource):
         return Example(number=number, id=self.ids[self.usable[pair]], batch=batch, targets=targets)
 
     def fill(self, index: int) -> None:
-        """As `OpenedSource.fill`: a pair must be one that the network can look at."""
+        """As `OpenedSource.fill`: a pair must be valid input of the network."""
         lazy = LazyPair(self.pairs, index)
         pair = _restored(self.cache.get(self._key(index), lambda: _tensors(lazy.pair())))
         network_class(self.kind).example(pair, self.config, np.random.default_rng(0))
 
     def is_prepared(self, index: int) -> bool:
-        """As `OpenedSource.is_prepared`: clouds are kept for all networks, so that this one has yet to look at them."""
+        """As `OpenedSource.is_prepared`: clouds are stored for all networks, so that this one still has to check
+        them."""
         return False
 
     def _key(self, index: int) -> tuple[object, ...]:
@@ -83,7 +84,7 @@ def open_examples(source: Source, recipe: Recipe, cache: Path, *, told: bool = T
 
 
 def learn(network: Pretrained, examples: Sequence[Example]) -> Outcome:
-    """Losses of one example, or of several that make one step, ready for ``backward``."""
+    """Losses of one example, or of several in one step, ready for ``backward``."""
     pairs = [(example.batch, example.targets) for example in examples]
     batch, targets = network.collate(pairs) if network.together else pairs[0]
     losses = network.losses(network.training_output(batch), targets)

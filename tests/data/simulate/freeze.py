@@ -4,7 +4,7 @@
 Run it together with a new `Tier.version` in tiers.py, never alone.
 
 Where the processor and the libraries are those that wrote frozen.json, the bytes of both clouds and of the
-photograph must be the same. Elsewhere last bits may differ in sines, products and the ray caster, so that here and
+camera image must be the same. Elsewhere last bits may differ in sines, products and the ray caster, so that here and
 there a coordinate falls on the other side of its 4 mm grid, or a pulse is lost: the pose must then agree to a
 micrometre, and 95 % of the points in a sample chosen by the points' own hashes must be the very same.
 """

@@ -6,7 +6,7 @@ import numpy as np
 
 from hybridreg.data.simulate import SCENES, Drawn
 from hybridreg.data.simulate.drawn import world_with
-from hybridreg.data.simulate.sensing.camera import ACROSS, UP, Camera, photograph
+from hybridreg.data.simulate.sensing.camera import ACROSS, UP, Camera, render_image
 from hybridreg.data.simulate.sensing.light import Light
 from hybridreg.data.simulate.sensing.stands import single_stand
 
@@ -44,7 +44,7 @@ def test_no_two_exposures_are_alike_and_the_weather_shows() -> None:
     world = world_with(layout, stand)
     camera = Camera.near(stand.T_world_sensor, rng)
     shots = [
-        photograph(
+        render_image(
             world, layout.surface, camera, Light.draw(np.random.default_rng(k)), np.random.default_rng(9)
         )
         for k in range(4)
@@ -59,5 +59,5 @@ def test_sky_is_above_and_ground_below() -> None:
     stand = single_stand(layout, rng)
     camera = Camera(stand.T_world_sensor, 80.0, 0.0)
     light = Light.draw(np.random.default_rng(2))
-    shot = photograph(world_with(layout, stand), layout.surface, camera, light, rng).astype(float)
+    shot = render_image(world_with(layout, stand), layout.surface, camera, light, rng).astype(float)
     assert shot[:60].mean() > shot[-40:].mean() + 10

@@ -98,9 +98,9 @@ def test_the_options_in_a_published_file_are_read_without_running_anything(
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"conv1.kernel": None}, r"conv1\.kernel is missing; these are no weights of FCGF"),
+        ({"conv1.kernel": None}, r"conv1\.kernel is missing; these are not weights of FCGF"),
         ({"final.kernel": None}, r"final\.kernel is missing"),
-        ({"conv1.kernel": torch.zeros(26, 1, 8)}, "26 offsets are no cube"),
+        ({"conv1.kernel": torch.zeros(26, 1, 8)}, "26 offsets are not a cube"),
         ({"conv3.kernel": torch.zeros(27, 16, 24, 1)}, "which no kernel has"),
         ({"block2.norm1.bn.weight": None}, "encoder.1.block.norm1.weight is missing"),
         ({"conv3_tr.kernel": torch.zeros(27, 24, 9)}, "has shape"),

@@ -145,13 +145,13 @@ def test_a_published_checkpoint_is_a_stage(trained: str, tmp_path: Path) -> None
         for stage in (hr.OmNet.load_official(tmp_path / "omnet.pth", points=256), hr.OmNet(weights=trained))
     )
     assert np.allclose(one.T, two.T)
-    assert any("OMNet looked at 256 of" in note for note in scene.notes)
+    assert any("OMNet used 256 of" in note for note in scene.notes)
 
 
 def test_what_does_not_fit_is_refused(trained: str, monkeypatch: pytest.MonkeyPatch) -> None:
     scene, _ = testing.sample_scene()
     monkeypatch.setattr(memory_estimate, "available_bytes", lambda device: 10**6)
-    with pytest.raises(ValueError, match="256 target and 256 source points.*look at fewer with points="):
+    with pytest.raises(ValueError, match="256 target and 256 source points.*use fewer with points="):
         hr.OmNet(weights=trained)(scene, Correspondences.none(), np.random.default_rng(0))
 
 

@@ -196,7 +196,7 @@ def test_pairs_within_a_radius() -> None:
         (("last_unary",), r"encoder must be some of"),
         (
             ("simple", "simple_strided", "simple_strided", *["nearest_upsample"] * 2, "last_unary"),
-            r"each nearest_upsample wants a unary",
+            r"each nearest_upsample needs a unary",
         ),
     ],
 )

@@ -45,7 +45,8 @@ def test_a_wall_taken_for_the_ground_does_no_harm(
     pair: LabelledPair, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     wall = ground.Ground(np.array([1.0, 0.0, 0.0]), -2.0)
-    monkeypatch.setattr(ground, "find", lambda scene, side: wall if side == "source" else None)
+    found = iter([None, wall])  # the target's is asked for first
+    monkeypatch.setattr(ground, "under", lambda points, viewpoint, spacing: next(found, None))
     result = CROSS3DREG.run(pair.pair)
     assert is_right(result.transformation, pair.T_target_source)
 

@@ -62,8 +62,8 @@ def test_they_run_where_open3d_is_absent() -> None:
 
 
 def test_a_misfit_names_the_matchers_that_give_groups() -> None:
-    with pytest.raises(ValueError, match=r"needs 'group'.*cofinet, geotransformer, given, roitr, vgam"):
-        hr.Pipeline(match="fpfh", estimate="lgr")
+    with pytest.raises(ValueError, match=r"needs 'group'.*cofinet, fpfh, geotransformer, given, roitr, vgam"):
+        hr.Pipeline(match=hr.DenseFeatures(untrained=True), estimate="lgr")
 
 
 def test_all_are_registered_under_their_names() -> None:

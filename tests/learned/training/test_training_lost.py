@@ -68,7 +68,7 @@ def test_sigterm_ends_with_143_and_says_how_to_go_on(
     process.terminate()
     _, told = process.communicate(timeout=120.0)
     assert process.returncode == 143
-    assert told.splitlines()[-1] == f"hybridreg: stopped by SIGTERM; go on with --resume --out {out}"
+    assert told.splitlines()[-1] == f"hybridreg: stopped by SIGTERM; continue with --resume --out {out}"
     assert checkpoint.load(out / "checkpoint.pt")["progress"].total > 0
 
 

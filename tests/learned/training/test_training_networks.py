@@ -141,7 +141,7 @@ def test_moving_a_pair_moves_its_truth() -> None:
         ({"network": 3}, "network: expected a table"),
         ({"network": {"name": 3}}, "network.name: expected a text"),
         ({"network": {"name": "fcgf", "voxels": 0.3}}, r"unknown keys \['voxels'\]"),
-        ({"network": "fcgf", "omp": False}, "omp: a part of cross3dreg, which fcgf has not"),
+        ({"network": "fcgf", "omp": False}, "omp: a part of cross3dreg, which fcgf does not have"),
         ({"network": "fcgf", "size": "tiny"}, "unknown size 'tiny' of FCGF"),
         (
             {"network": "fcgf", "phase": [{"name": "p", "steps": 1, "losses": {"fine": 0.0}}]},

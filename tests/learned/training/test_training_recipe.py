@@ -59,7 +59,9 @@ def test_a_mistake_names_its_key_and_what_would_do(
 
 
 def test_a_file_that_is_none(tmp_path: Path) -> None:
-    with pytest.raises(FileNotFoundError, match=r"no recipe of that name; known are .*paper, smoke"):
+    with pytest.raises(
+        FileNotFoundError, match=r"no recipe of that name; known are .*paper, paper-a, .*smoke"
+    ):
         recipe_file.read("nothing")
     (tmp_path / "x.toml").write_text("size =")
     with pytest.raises(ValueError, match=r"x\.toml: not a TOML file"):
@@ -158,3 +160,34 @@ def test_a_folder_left_open_is_filled_everywhere(make_recipe: MakeRecipe) -> Non
     both = make_recipe(data={"train": [{"data": "{a}", "name": "x"}, {"data": "b", "name": "y"}]})
     other = data_choice.with_data(both, ["a=one", "y=two"])
     assert [s.data for s in other.data.train] == ["one", "two"]
+
+
+def test_the_papers_rows_are_recipes_of_their_own() -> None:
+    rows = {letter: recipe_file.read(f"paper-{letter}").network for letter in "abc"}
+    rows["d"] = recipe_file.read("paper").network
+    parts = {
+        k: (n.omp is not None, n.vgam is not None, n.transformer.self_attention) for k, n in rows.items()
+    }
+    assert parts == {
+        "a": (False, False, "geometric"),
+        "b": (True, False, "vanilla"),
+        "c": (True, False, "geometric"),
+        "d": (True, True, "geometric"),
+    }
+    for network in rows.values():
+        assert network.matching.vote_temperature is None
+        assert network.omp is None or not (network.omp.cross_cloud or network.omp.evidence)
+
+
+def test_range_and_height_do_not_go_with_full_rotations() -> None:
+    table = {
+        "size": "nano",
+        "augmentation": {"rotation": "full"},
+        "data": {"train": [{"data": "sim:train/near#1"}]},
+        "phase": [{"name": "p", "steps": 1}],
+    }
+    with pytest.raises(ValueError, match="point_position='radial' means range and height"):
+        recipe_file.parse(table, name="r")
+    recipe_file.parse({**table, "network": {"vgam": {"point_position": "mlp"}}}, name="r")
+    recipe_file.parse({**table, "augmentation": {"rotation": "yaw"}}, name="r")
+    recipe_file.parse({**table, "vgam": False}, name="r")

@@ -98,7 +98,7 @@ def test_a_second_signal_ends_at_once(
 
 
 def test_a_folder_that_holds_a_run_is_not_run_over(whole: Run, cache: Path) -> None:
-    with pytest.raises(FileExistsError, match="holds a run already: go on with --resume"):
+    with pytest.raises(FileExistsError, match="already holds a run: continue with --resume"):
         train(whole.recipe, options(whole.out, cache))
 
 

@@ -40,7 +40,7 @@ def options(out: Path, cache: Path, **more: Any) -> RunOptions:
 
 
 def write_pair(folder: Path, seed: int, n_points: int = 600) -> None:
-    """A made pair with a photograph, as `PairFolder` reads it."""
+    """A made pair with a camera image, as `PairFolder` reads it."""
     folder.mkdir(parents=True)
     pair, T = testing.sample_pair(seed, n_points)
     np.save(folder / "source.npy", pair.source.points)

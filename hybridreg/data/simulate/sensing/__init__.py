@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: MIT
-"""Sensors that look at a simulated scene, and the camera."""
+"""Sensors that scan a simulated scene, and the camera."""

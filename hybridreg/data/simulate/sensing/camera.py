@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A photograph of roughly what the source sees, by an uncalibrated camera."""
+"""The camera image of roughly what the source sees, by an uncalibrated camera."""
 
 from __future__ import annotations
 
@@ -17,16 +17,18 @@ from hybridreg.data.simulate.world.layout import Surface
 from hybridreg.data.simulate.world.materials import COLOUR, GLOSS, GROUND
 from hybridreg.data.simulate.world.texture import shade_factor
 
-WIDTH, HEIGHT = 512, 288
-# Cameras measure one colour per pixel and guess the others: their pictures resolve about half of their pixels.
-# So do these, which are drawn at the smaller size and enlarged.
-ACROSS, UP = 384, 216
-SHADOWS = np.float32(300)  # metres over which things cast them
+WIDTH = 512  # pixels of the image
+HEIGHT = 288
+# Cameras measure one colour per pixel and interpolate the others: images resolve about half of their pixels.
+# So do these, which are rendered at the smaller size and enlarged.
+ACROSS = 384  # pixels that are rendered
+UP = 216
+SHADOWS = np.float32(300)  # metres over which objects cast them
 
 
 @dataclass(frozen=True)
 class Camera:
-    """Pose and lens; nobody downstream is told them."""
+    """Pose and lens; unknown to everything downstream."""
 
     T_world_camera: np.ndarray  # x forward, y left, z up
     fov_deg: float
@@ -34,7 +36,7 @@ class Camera:
 
     @staticmethod
     def near(T_world_source: np.ndarray, rng: np.random.Generator) -> Camera:
-        """A camera mounted by the source: some decimetres and degrees off, as rigs are."""
+        """A camera mounted next to the source sensor, some decimetres and degrees off, as on real rigs."""
         T = T_world_source.copy()
         T[:3, 3] += T[:3, :3] @ rng.normal(0, [0.15, 0.2, 0.15])
         aside = np.radians(rng.normal(0, [4.0, 2.5, 1.2]))
@@ -55,10 +57,10 @@ class Camera:
         return turned(d, self.T_world_camera[:3, :3])
 
 
-def photograph(
+def render_image(
     world: World, surface: Surface, camera: Camera, light: Light, rng: np.random.Generator
 ) -> NDArray[np.uint8]:
-    """RGB picture (288,512,3) uint8 with sun, sky, haze, texture, vignette and noise."""
+    """RGB image (288,512,3) uint8 with sun, sky, haze, texture, vignette and noise."""
     rays = camera.rays(rng)
     origin = camera.T_world_camera[:3, 3].astype(np.float32)
     hits = with_ground(world.cast(origin, rays), origin, rays, surface)

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Ray casting by Embree, through open3d where it is installed, else through the `embreex` wheel.
+"""Ray casting by Embree, through open3d where it is installed, otherwise through the `embreex` wheel.
 
-Both gave the same bits wherever they were compared; open3d takes a scene over in a millisecond, embreex copies
-it number by number.
+Both gave the same bits wherever they were compared; open3d takes over a scene in a millisecond, embreex copies it
+number by number.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ class Caster(Protocol):
         """`t` (n,) float32 (inf where none) and face index (n,) int32 (-1 where none) of the first triangle."""
 
     def blocked(self, rays: np.ndarray) -> np.ndarray:
-        """Whether a triangle stands between t = 0 and t = 1, (n,) bool."""
+        """Whether a triangle lies between t = 0 and t = 1, (n,) bool."""
 
 
 class EmbreexCaster:
@@ -63,7 +63,7 @@ class EmbreexCaster:
 
 
 class Open3dCaster:
-    """Embree as open3d carries it."""
+    """Embree as bundled with open3d."""
 
     def __init__(self, mesh: Mesh) -> None:
         from hybridreg.runtime.open3d import load_open3d
@@ -78,7 +78,7 @@ class Open3dCaster:
     def cast(self, rays: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """See `Caster.cast`."""
         found = self._scene.cast_rays(self._tensor.from_numpy(rays))
-        # Open3D's mark of a miss, 2^32 - 1, is -1 when read as a signed number.
+        # Open3D's marker of a miss, 2^32 - 1, is -1 when read as a signed number.
         return found["t_hit"].numpy(), found["primitive_ids"].numpy().view(np.int32)
 
     def blocked(self, rays: np.ndarray) -> np.ndarray:
@@ -122,7 +122,7 @@ def _face_normals(mesh: Mesh) -> NDArray[np.float32]:
 
 
 class World:
-    """Still and moving geometry as it stands at one moment, ready for rays."""
+    """Static and moving geometry at one moment, ready for ray casting."""
 
     def __init__(self, parts: list[Part]) -> None:
         parts = [part for part in parts if len(part.mesh.faces)]
@@ -146,7 +146,7 @@ class World:
         return Hits(distance, normal, self.material.take(face, mode="wrap"), face)
 
     def clear(self, origins: np.ndarray, segments: np.ndarray) -> NDArray[np.bool_]:
-        """Whether nothing stands on the way (n,3) from `origins` (n,3) or (3,) to `origins + segments`."""
+        """Whether the segments (n,3) are unobstructed, from `origins` (n,3) or (3,) to `origins + segments`."""
         rays = _rays(origins, segments)
         clear = np.arange(len(rays))
         for part in self._parts:

@@ -20,7 +20,7 @@ def decode(data: bytes) -> NDArray[np.uint8]:
     Raises
     ------
     ValueError
-        For bytes that are no picture.
+        For bytes that are not an image.
     """
     import cv2
 

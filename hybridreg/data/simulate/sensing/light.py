@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Sun, sky, haze and how the camera exposes them."""
+"""Sun, sky, haze and the camera's exposure."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""How much of one scan the other has seen: measured on clouds, and guessed beforehand from a few rays."""
+"""Overlap of two scans: measured on clouds, and estimated beforehand from a few rays."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ RADIUS = 0.5  # metres; the definition that the real pairs' figures use
 
 
 def thin(points: np.ndarray, voxel: float) -> np.ndarray:
-    """One measured point (the first) of each occupied cube of edge `voxel`, cube after cube: it compresses well."""
+    """One measured point (the first) of each occupied voxel of edge `voxel`, voxel after voxel: it compresses well."""
     return points[first_of_cubes(points, voxel)] if len(points) else points
 
 
 def first_of_cubes(points: np.ndarray, voxel: float) -> np.ndarray:
-    """Index (m,) of the first point in each occupied cube, cube after cube."""
+    """Index (m,) of the first point in each occupied voxel, voxel after voxel."""
     cells = [_cells(points[:, k], voxel) for k in range(3)]
     n, span = len(points), [int(cell.max()) + 1 for cell in cells]
     if span[0] * span[1] * span[2] * n >= 2**63:
@@ -51,7 +51,7 @@ def overlap(
     low, high = moved.min(axis=0) - radius, moved.max(axis=0) + radius
     inside = [(target[:, k] >= low[k]) & (target[:, k] <= high[k]) for k in range(3)]
     near = target[inside[0] & inside[1] & inside[2]]
-    # A tree that is not balanced is built three times as fast and asked nearly as fast.
+    # A tree that is not balanced is built three times as fast and queried nearly as fast.
     tree = cKDTree(near, balanced_tree=False, compact_nodes=False)
     distance, _ = tree.query(moved, distance_upper_bound=radius)
     return float(np.isfinite(distance).mean())
@@ -60,7 +60,7 @@ def overlap(
 def expected_overlap(
     world: World, source: Sensor, target: Sensor, T_world_source: np.ndarray, T_world_target: np.ndarray
 ) -> float:
-    """A guess at `overlap` from some hundred rays: what share of the source's hits the target's beams reach."""
+    """An estimate of `overlap` from some hundred rays: the share of the source's hits that the target's beams reach."""
     directions = _few_directions(source) @ T_world_source[:3, :3].T.astype(np.float32)
     hits = world.cast(T_world_source[:3, 3], directions)
     seen = (hits.distance > source.range_min) & (hits.distance < source.range_10)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Where each kind of sensor points its pulses: unit directions in firing order, x forward and z up."""
+"""Scan patterns of each kind of sensor: unit directions in firing order, x forward and z up."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def _directions(azimuth: np.ndarray, elevation: np.ndarray) -> np.ndarray:
 
 
 def spinning(sensor: Sensor, rng: np.random.Generator) -> np.ndarray:
-    """Rings, one beam after the other; each unit's beams are off by a few hundredths of a degree."""
+    """Rings, one beam after the other; each unit's beams are misaligned by a few hundredths of a degree."""
     beams = len(sensor.elevations_deg)
     steps = sensor.points // beams
     elevation = np.radians(np.array(sensor.elevations_deg) + rng.normal(0, 0.03, beams))
@@ -30,7 +30,7 @@ def spinning(sensor: Sensor, rng: np.random.Generator) -> np.ndarray:
 
 
 def fan(sensor: Sensor, rng: np.random.Generator) -> np.ndarray:
-    """Five modules side by side, each a mirror that swings across its own part and is mounted not quite true."""
+    """Five modules side by side, each a mirror that scans its own part, slightly misaligned."""
     modules = 5
     wide, high = np.radians(sensor.fov_deg)
     part = wide / modules
@@ -49,7 +49,7 @@ def fan(sensor: Sensor, rng: np.random.Generator) -> np.ndarray:
 
 
 def rosette(sensor: Sensor, rng: np.random.Generator) -> np.ndarray:
-    """Two wedge prisms turning against each other with six emitters in a row; no two scans repeat."""
+    """Two counter-rotating wedge prisms with six emitters in a row; no two scans repeat."""
     emitters = 6
     n = sensor.points // emitters
     wide, high = np.radians(sensor.fov_deg)
@@ -64,7 +64,7 @@ def rosette(sensor: Sensor, rng: np.random.Generator) -> np.ndarray:
 
 
 def raster(sensor: Sensor, rng: np.random.Generator) -> np.ndarray:
-    """Lines that lie close together about the horizon and wide apart at the rims."""
+    """Lines that are dense at the horizon and sparse at the edges."""
     wide, high = np.radians(sensor.fov_deg)
     rows = round(np.sqrt(sensor.points * high / wide) * 1.1)
     columns = sensor.points // rows

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""From first hits to what a sensor reports: power, noise, mixed pixels, strays, the blind zone."""
+"""From first hits to what a sensor reports: power, noise, mixed pixels, stray returns, the blind zone."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from hybridreg.data.simulate.sensing.sensors import Sensor
 from hybridreg.data.simulate.world.materials import LOST, MATERIAL_INDEX, REFLECTIVITY, ROUGHNESS
 
 STRAY_SHARE = 0.0004
-INSIDE_SHARE = 0.35  # of the pulses that pass a pane: they come back from the room or the seats behind it
-MIXED_SHARE = 0.3  # of pulses at an edge
+INSIDE_SHARE = 0.35  # share of the pulses that pass a pane and return from the room or the seats behind it
+MIXED_SHARE = 0.3  # share of the pulses at an edge
 GLASS = MATERIAL_INDEX["glass"]
 
 

@@ -18,7 +18,7 @@ from hybridreg.data.simulate.world.materials import GROUND
 
 
 def with_ground(hits: Hits, origin: np.ndarray, directions: np.ndarray, surface: Surface) -> Hits:
-    """Hits on the terrain given the material that lies there."""
+    """Terrain hits with the material of the ground there."""
     ground = np.flatnonzero((hits.material == GROUND) & (hits.face >= 0))
     distance = hits.distance.take(ground)
     x, y = (np.float32(origin[k]) + distance * directions[:, k].take(ground) for k in range(2))

@@ -23,8 +23,8 @@ class Sensor:
     range_min: float = 0.5  # blind zone, metres
     range_max: float = 120.0
     range_10: float = 60.0  # where half the pulses return from a 10 % target at right angles
-    noise_m: float = 0.012  # standard deviation near by
-    noise_growth: float = 0.0002  # and what each metre adds
+    noise_m: float = 0.012  # standard deviation at close range
+    noise_growth: float = 0.0002  # and its increase per metre
     divergence_mrad: float = 2.5
     quantum_m: float = 1 / 256  # coordinates come in steps of about 4 mm
 

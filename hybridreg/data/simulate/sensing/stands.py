@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Where the two sensors stand and look, so that the pair has its tier's distance and overlap."""
+"""Poses of the two sensors, so that the pair has its tier's distance and overlap."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def _stand(layout: Layout, xy: np.ndarray, carrier: Carrier, yaw: float, rng: np
 
 
 def free_place(layout: Layout, room: float, rng: np.random.Generator) -> np.ndarray:
-    """A place (2,) of the scene with `room` metres of clear ground about it, or the last one tried."""
+    """A position (2,) in the scene with `room` metres of clear ground around it, or the last one tried."""
     for _ in range(40):
         xy = layout.stand(rng)
         if layout.free(xy, room):
@@ -45,7 +45,7 @@ def free_place(layout: Layout, room: float, rng: np.random.Generator) -> np.ndar
 def _propose(
     layout: Layout, tier: Tier, carriers: tuple[Carrier, Carrier], rng: np.random.Generator
 ) -> tuple[Stand, Stand]:
-    """Two stands at the tier's distance; the source often looks towards the target, never by rule."""
+    """Two sensor poses at the tier's distance; the source often, but not always, looks towards the target."""
     best: tuple[float, np.ndarray, np.ndarray] = (np.inf, np.zeros(2), np.zeros(2))
     low, high = tier.distance
     for _ in range(400):
@@ -54,13 +54,13 @@ def _propose(
         miss = max(low - gap, gap - high, 0.0)
         if miss < best[0]:
             best = (miss, a, b)
-        # Distance first: it is asked a hundred times as fast as whether there is room.
+        # Distance first: it is checked a hundred times as fast as whether there is room.
         if miss == 0 and layout.free(a, carriers[0].room) and layout.free(b, carriers[1].room):
             best = (miss, a, b)
             break
     _, source, target = best
     between = target - source
-    if best[0] > 0:  # crowded scene: keep the direction, take the distance
+    if best[0] > 0:  # crowded scene: keep the direction, set the distance
         source = target - between / max(float(np.linalg.norm(between)), 1e-6) * np.mean(tier.distance)
         between = target - source
     towards = float(np.arctan2(between[1], between[0]))
@@ -73,7 +73,7 @@ def _propose(
 def choose_stands(
     layout: Layout, world: World, tier: Tier, sensors: tuple[Sensor, Sensor], rng: np.random.Generator
 ) -> tuple[Stand, Stand]:
-    """The first proposal whose expected overlap lies in the tier's range, else the nearest to it."""
+    """The first proposal whose expected overlap lies in the tier's range, otherwise the nearest to it."""
     carriers = (draw_carrier(rng), draw_carrier(rng))
     low, high = tier.overlap
     wanted = rng.uniform(low, high)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Clouds as sets are trained on and stored: one point per cube, no finer than the cube can use."""
+"""Clouds as they are trained on and stored: one point per voxel, quantised no finer than the voxel needs."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from hybridreg.data.simulate.sensing.overlaps import thin
 
 
 def thinned(points: NDArray[np.float32], voxel: float | None) -> NDArray[np.float32]:
-    """`points` (n,3) as they are where `voxel` is None, else one of each cube of that edge, rounded to `step`."""
+    """`points` (n,3) as they are where `voxel` is None, otherwise one of each voxel of that edge, rounded to `step`."""
     if voxel is None:
         return points
     size = np.float32(step(voxel))

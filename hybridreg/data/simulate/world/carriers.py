@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What carries a sensor, and gets in its view."""
+"""What carries a sensor, and appears in its view."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ CARS = {kind: partial(car, kind=kind) for kind in ("hatchback", "estate", "suv")
 
 @dataclass(frozen=True)
 class Carrier:
-    """A body about the sensor's foot point on the ground, and the sensor's height over that point."""
+    """A body around the sensor's foot point on the ground, and the sensor's height over that point."""
 
     body: Mesh
     height: float

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What stands about outdoors: lamps, signs, fences, walls, bollards, benches, bins, containers, pipes, rubble."""
+"""Outdoor furniture: lamps, signs, fences, walls, bollards, benches, bins, containers, pipes, rubble."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ GREY = (0.45, 0.46, 0.47)
 
 
 def muted(rng: np.random.Generator, strength: float = 0.45) -> np.ndarray:
-    """A colour (3,) as painted metal, cloth or plaster has it: a grey with a leaning."""
+    """A muted colour (3,), as of painted metal, cloth or plaster."""
     leaning = rng.dirichlet(np.full(3, 4.0)) * 3 - 1
     return np.clip(rng.uniform(0.12, 0.75) * (1 + strength * leaning), 0.03, 0.95)
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A scene while it is being laid out: what stands where, what moves, where a sensor may go."""
+"""The layout of a scene under construction: what stands where, what moves, where a sensor may go."""
 
 from __future__ import annotations
 
@@ -20,20 +20,19 @@ Stand = Callable[[np.random.Generator], np.ndarray]
 
 @dataclass
 class Layout:
-    """Ground, things that stay, and things that stand elsewhere (or nowhere) when the other sensor scans."""
+    """Ground, static objects, and objects that have moved (or are gone) when the other sensor scans."""
 
     terrain: Terrain
     surface: Surface
     stand: Stand
     still: list[Mesh] = field(default_factory=list)
-    at_source: list[Mesh] = field(
-        default_factory=list
-    )  # movers when the source scans (and the picture is taken)
-    at_target: list[Mesh] = field(default_factory=list)  # the same movers when the target scans
+    # Moving objects when the source scans (and the image is taken), and the same ones when the target scans.
+    at_source: list[Mesh] = field(default_factory=list)
+    at_target: list[Mesh] = field(default_factory=list)
     taken: Taken = field(default_factory=Taken)
 
     def free(self, xy: np.ndarray, radius: float) -> bool:
-        """Whether a disc about `xy` (2,) touches nothing."""
+        """Whether a disc around `xy` (2,) is free."""
         return self.taken.free(xy, radius)
 
     def claim(self, xy: np.ndarray, half: tuple[float, float], yaw: float = 0.0) -> None:
@@ -41,11 +40,11 @@ class Layout:
         self.taken.add(xy, half, yaw)
 
     def on_ground(self, thing: Mesh, xy: np.ndarray, yaw: float = 0.0) -> Mesh:
-        """`thing` (made about the origin) turned and set down at `xy`."""
+        """`thing` (modelled at the origin) rotated and placed at `xy`."""
         return thing.moved(yaw, (xy[0], xy[1], self.terrain.height_at(xy)))
 
     def put(self, thing: Mesh, xy: np.ndarray, yaw: float, half: tuple[float, float]) -> bool:
-        """Set down a thing that stays, unless something is there already; says whether it was set down."""
+        """Place a static object, unless something is there already; returns whether it was placed."""
         if not self.free(xy, max(half)):
             return False
         self.claim(xy, half, yaw)
@@ -61,7 +60,7 @@ class Layout:
         half: tuple[float, float],
         when: str = "both",
     ) -> bool:
-        """Set down a mover: at `xy` for the source scan, at `xy + step` for the target scan.
+        """Place a moving object: at `xy` for the source scan, at `xy + step` for the target scan.
 
         when: "both", or "source"/"target" for one that is gone at (or has come by) the other scan.
         """

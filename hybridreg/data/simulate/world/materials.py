@@ -10,7 +10,7 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Material:
-    """How one kind of surface answers a laser pulse and how it looks."""
+    """How one kind of surface reflects a laser pulse and how it looks."""
 
     name: str
     reflectivity: float  # share of near-infrared light (905 nm) sent back at right angles
@@ -19,11 +19,11 @@ class Material:
     texture: str  # pattern that the camera sees, one of texture.PATTERNS
     contrast: float  # strength of that pattern
     gloss: float = 0.0  # share of the sky mirrored in the picture
-    colour: tuple[float, float, float] = (0.5, 0.5, 0.5)  # as ground; other faces bring their own tint
+    colour: tuple[float, float, float] = (0.5, 0.5, 0.5)  # as ground; other faces have their own tint
 
 
 MATERIALS = (
-    # Terrain triangles carry this one; which of the next six a hit is, the layout says.
+    # Terrain triangles have this one; the layout says which of the next six a hit is.
     Material("ground", 0.30, 0.010, 0.01, "none", 0.0),
     Material("asphalt", 0.20, 0.006, 0.01, "speckle", 0.10, colour=(0.30, 0.30, 0.31)),
     Material("paving", 0.32, 0.005, 0.01, "tiles", 0.16, colour=(0.52, 0.51, 0.49)),

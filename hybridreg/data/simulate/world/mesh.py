@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Triangles with a material and a tint: what every simulated thing is made of."""
+"""Triangles with a material and a tint: what every simulated object is made of."""
 
 from __future__ import annotations
 

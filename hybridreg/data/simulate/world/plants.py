@@ -53,13 +53,13 @@ def tree(rng: np.random.Generator, kind: str, leaves: int) -> Mesh:
     return Mesh.merge([trunk, branches, _crown(rng, kind, knee, top, tips, height, leaves)])
 
 
-# One maker for each kind and fineness, as the pool wants them.
+# One maker for each kind and level of detail, as the pool needs them.
 FINENESS = (480, 240, 110)
 TREES = {(kind, leaves): partial(tree, kind=kind, leaves=leaves) for kind in KINDS for leaves in FINENESS}
 
 
 def tree_from_pool(rng: np.random.Generator, distance: float, kind: str | None = None) -> Mesh:
-    """A tree as fine as its `distance` (metres) from the scene's centre deserves; kind None draws one."""
+    """A tree in the detail that its `distance` (metres) from the scene's centre needs; kind None draws one."""
     kind = kind or one(rng, tuple(KINDS), tuple(KINDS.values()))
     leaves = FINENESS[bisect_left((24.0, 45.0), distance)]
     return one_of(TREES[kind, leaves], rng, variants=40, stretch=0.16)
@@ -102,7 +102,7 @@ def _crown(
         drop = np.c_[reach * np.cos(angle), reach * np.sin(angle), -0.35 * reach]
         centres = knee + (top + [0, 0, 0.05 * height] - knee) * level[:, None] + drop
     else:
-        # Clumps about the branch tips, uneven in size: the outline is ragged, with gaps to see through.
+        # Clumps around the branch tips, uneven in size: the outline is ragged, with gaps to see through.
         clump = rng.integers(len(tips), size=leaves)
         width = rng.uniform(0.05, 0.13, len(tips))[clump, None] * height * (0.6 if kind == "tall" else 1.0)
         centres = tips[clump] + rng.normal(0, 0.65, (leaves, 3)) * width * [1, 1, 0.8]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Things made once and used many times, each time stretched, turned and tinted anew: scenes come cheap."""
+"""Objects made once and reused, each time stretched, rotated and tinted differently: scenes are cheap."""
 
 from __future__ import annotations
 

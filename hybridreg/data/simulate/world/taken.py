@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Which ground of a scene is taken: turned rectangles, asked thousands of times a scene."""
+"""Which ground of a scene is occupied: rotated rectangles, queried thousands of times a scene."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ _ROOM = 128  # rectangles at first
 
 
 class Taken:
-    """Rectangles, and whether a disc touches one."""
+    """Rectangles, and whether a disc touches any."""
 
     def __init__(self) -> None:
         self._count = 0
@@ -23,7 +23,7 @@ class Taken:
         if self._count == self._circles.shape[1]:
             self._circles = np.concatenate([self._circles, np.zeros_like(self._circles)], axis=1)
         wide, deep = float(half[0]), float(half[1])
-        # A hair wider, so that rounding never leaves a rectangle out.
+        # Slightly larger, so that rounding never leaves a rectangle out.
         self._circles[:, self._count] = xy[0], xy[1], math.hypot(wide, deep) + 1e-6
         self._count += 1
         self._boxes.append((wide, deep, float(np.cos(yaw)), float(np.sin(yaw))))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Patterns on surfaces, from their world coordinates: enough for an image encoder to hold on to."""
+"""Patterns on surfaces, from their world coordinates: enough for an image encoder to work with."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Ground that is nowhere quite flat."""
+"""Uneven ground."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ class Terrain:
     def mesh(self, rng: np.random.Generator, bumps: float) -> Mesh:
         """Triangles out to the rim, fine near the centre, with `bumps` metres of small unevenness.
 
-        Which part is road and which is lawn is asked of the layout per hit, finer than any triangle.
+        Which part is road and which is lawn is looked up in the layout per hit, finer than any triangle.
         """
         x, y = np.meshgrid(_AXIS, _AXIS, indexing="ij")
         z = self.height(x, y) + rng.normal(0, bumps, x.shape)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What closes the view far away: blocks and tree tops, coarse because nobody comes near them."""
+"""The backdrop far away: blocks and tree tops, coarse because no sensor comes near them."""
 
 from __future__ import annotations
 

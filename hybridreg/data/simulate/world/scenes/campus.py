@@ -41,7 +41,7 @@ def _paths(rng: np.random.Generator) -> Surface:
 
 
 def campus(rng: np.random.Generator) -> Layout:
-    """Buildings on every side, none parallel to the next by rule."""
+    """Buildings on every side, not necessarily parallel to each other."""
     terrain = Terrain.draw(rng, rng.uniform(0.4, 1.0))
     layout = Layout(terrain, _paths(rng), lambda r: spot(r, 30))
     layout.still.append(terrain.mesh(rng, 0.025))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Scenes that hardly fix a pose: a corridor (little holds the long axis) and an open field (little holds yaw)."""
+"""Degenerate scenes: a corridor (the long axis is poorly constrained) and an open field (yaw is poorly constrained)."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from hybridreg.data.simulate.world.uneven_ground import Terrain
 
 
 def corridor(rng: np.random.Generator) -> Layout:
-    """Two long walls along x, an underpass or a lane: a few piers and small things here and there, else blank."""
+    """Two long walls along x, an underpass or a lane: a few piers and small objects here and there, otherwise bare."""
     terrain = Terrain.draw(rng, 0.05)
     half, asphalt = rng.uniform(2.0, 5.0), MATERIAL_INDEX["asphalt"]
     layout = Layout(
@@ -41,7 +41,7 @@ def corridor(rng: np.random.Generator) -> Layout:
 
 
 def _piers(layout: Layout, y: float, height: float, rng: np.random.Generator) -> None:
-    # At odd intervals, for a regular row would fit one bay off as well as at home.
+    # At irregular intervals, as a regular row would fit equally well one bay off.
     for x in rng.uniform(-55, 55, int(rng.integers(4, 12))):
         width, depth = rng.uniform(0.3, 1.2), rng.uniform(0.2, 0.7)
         size = np.array([width, depth, height * rng.uniform(0.5, 1.0)])

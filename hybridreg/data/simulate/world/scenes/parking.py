@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A car park: the same thing over and over, which is what makes it hard."""
+"""A car park: the same objects over and over, which is what makes it hard."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Strewing things over a scene: trees, people, cars, small furniture."""
+"""Scattering objects over a scene: trees, people, cars, small furniture."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def in_box(rng: np.random.Generator, low: Sequence[float], high: Sequence[float]
 
 
 def spot(rng: np.random.Generator, half: float) -> np.ndarray:
-    """What `in_box` would give for one place (2,) of a square about the origin, sooner."""
+    """As `in_box` for one place (2,) of a square around the origin, but faster."""
     x, y, far = rng.uniform(-1, 1), rng.uniform(-1, 1), rng.uniform(0.25, 1)
     return np.array([x * far * half, y * far * half])
 
@@ -48,7 +48,7 @@ def plant_bushes(layout: Layout, places: np.ndarray, rng: np.random.Generator) -
 
 
 def add_people(layout: Layout, places: np.ndarray, rng: np.random.Generator) -> None:
-    """People and cyclists; most have gone on, come or left by the time of the other scan."""
+    """People and cyclists; most have moved on, arrived or left by the time of the other scan."""
     for xy in places:
         yaw = rng.uniform(0, 2 * np.pi)
         heading = np.array([np.cos(yaw), np.sin(yaw)])
@@ -96,7 +96,7 @@ def _when(rng: np.random.Generator, both: float = 0.6) -> str:
 
 
 def add_furniture(layout: Layout, places: np.ndarray, yaw: float, rng: np.random.Generator) -> None:
-    """Small things at `places` (n,2), turned by `yaw`."""
+    """Small objects at `places` (n,2), rotated by `yaw`."""
     makers = (bench, bin_or_cabinet, sign, billboard, lamp)
     for xy in places:
         thing = one_of(one(rng, makers, (0.2, 0.3, 0.25, 0.1, 0.15)), rng, stretch=0.12)

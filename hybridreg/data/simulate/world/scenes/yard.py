@@ -33,7 +33,7 @@ from hybridreg.data.simulate.world.uneven_ground import Terrain
 
 
 def yard(rng: np.random.Generator) -> Layout:
-    """Stacks and machines at odd angles inside a fence."""
+    """Stacks and machines at arbitrary angles inside a fence."""
     terrain = Terrain.draw(rng, rng.uniform(0.15, 0.8))
     hard, soft = (
         MATERIAL_INDEX[m] for m in rng.choice([["asphalt", "gravel"], ["gravel", "soil"], ["soil", "soil"]])

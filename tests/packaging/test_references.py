@@ -6,7 +6,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parent.parent
+ROOT = Path(__file__).resolve().parents[2]
 METHODS = (ROOT / "docs" / "methods.md").read_text()
 SECTIONS = set(re.findall(r"^##+ (\d+(?:\.\d+)?)", METHODS, re.MULTILINE))
 # "(docs/methods.md 5.2, 7.2)" and "(docs/methods.md 6.1 to 6.5)".

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: MIT
-"""Cures in the words of the command line: messages name Python's arguments, its users have options."""
+"""Advice in error messages, in terms of the command line: messages name Python arguments, its users have options."""
 
 from __future__ import annotations
 
 import re
 
-# What a message says, and what the command line calls it.
+# A phrase of a message, and the same in command-line terms.
 WORDS = (
     (r'pass nonfinite="drop"', "pass --nonfinite drop"),
     (r"pass image=\.\.\.", "pass --image FILE"),
@@ -27,7 +27,7 @@ WORDS = (
 
 
 def spoken(text: str) -> str:
-    """A message as a user of the command line can follow it."""
+    """A message whose advice a user of the command line can follow."""
     for said, means in WORDS:
         text = re.sub(said, means, text)
     return text

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Text on terminals of any encoding: what one cannot show is spelled in ASCII, and never an error."""
+"""Text on terminals of any encoding: characters that one cannot show are spelled in ASCII and never an error."""
 
 from __future__ import annotations
 
@@ -35,10 +35,10 @@ codecs.register_error(_FALLBACK, _spell)
 
 
 def make_ready() -> None:
-    """Have stdout and stderr show any text, and be there at all.
+    """Make sure that stdout and stderr exist and can show any text.
 
-    A closed stream (`2>&-`) leaves its number to the next file that is opened, so that what a library prints would
-    go into our results.
+    The number of a closed stream (`2>&-`) goes to the next file that is opened, so that output of a library would end
+    up in our results.
     """
     for number in (0, 1, 2):
         try:
@@ -54,6 +54,6 @@ def make_ready() -> None:
 
 
 def shown(text: str, stream: TextIO | None = None) -> str:
-    """The text as a stream (stdout) will show it, for columns that must know its width."""
+    """The text as a stream (stdout) will show it, for columns that depend on its width."""
     encoding = getattr(stream or sys.stdout, "encoding", None) or "utf-8"
     return text.encode(encoding, _FALLBACK).decode(encoding)

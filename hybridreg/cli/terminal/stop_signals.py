@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""SIGINT, SIGTERM and SIGHUP end a command as Ctrl-C does: what is done is kept, and a line tells how to go on."""
+"""SIGINT, SIGTERM and SIGHUP end a command as Ctrl-C does: finished work is kept, and a line says how to continue."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ class Stopped(KeyboardInterrupt):
 def stoppable() -> Iterator[None]:
     """Turn the first signal into `Stopped`; the second ends the process at once.
 
-    A signal that is ignored (`nohup`, a shell's `&`) or handled by somebody else is left alone. While a library
-    computes without a word Python hears no signal until it returns, a second or two.
+    A signal that is ignored (`nohup`, a shell's `&`) or handled elsewhere is left alone. While a library computes,
+    Python receives no signal until it returns, a second or two.
     """
     if threading.current_thread() is not threading.main_thread():
         yield
@@ -57,7 +57,7 @@ def _at_once(number: int, _: FrameType | None) -> None:
 
 @contextmanager
 def going_on(how: Callable[[], str]) -> Iterator[None]:
-    """Have the line of a block that is stopped tell what is kept and how to go on."""
+    """Have the message of a block that is stopped say what is kept and how to continue."""
     try:
         yield
     except KeyboardInterrupt as error:

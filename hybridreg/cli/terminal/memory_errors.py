@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Too little memory, whichever library noticed it, in one sentence."""
+"""Out of memory, whichever library reports it, in one sentence."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import errno
 
 _LEAST = 1600 * 2**20
 
-# What libraries say where Python says MemoryError: torch, C++, OpenCV, the loader of shared libraries, threads, BLAS.
+# Messages of libraries that mean MemoryError: torch, C++, OpenCV, the dynamic linker, threads, BLAS.
 _SAID = (
     "not enough memory",
     "can't allocate memory",
@@ -23,7 +23,7 @@ _SAID = (
 
 
 def lacks_memory(error: BaseException) -> bool:
-    """Is it for want of memory that this was raised?"""
+    """Was this raised for lack of memory?"""
     if isinstance(error, MemoryError) or (isinstance(error, OSError) and error.errno == errno.ENOMEM):
         return True
     text = str(error).lower()
@@ -31,9 +31,9 @@ def lacks_memory(error: BaseException) -> bool:
 
 
 def memory_sentence(error: BaseException) -> str:
-    """What to tell: what was wanted, what limits it, and the cure."""
+    """The message: what was requested, what limits it, and what to do."""
     told = " ".join(str(error).split())[:200]
-    what = f"the memory is not enough{f' ({told})' if told else ''}"
+    what = f"not enough memory{f' ({told})' if told else ''}"
     limit = address_space()
     if limit is not None:
         return (

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Errors and warnings as a user of the command line wants them: one sentence on stderr, no traceback."""
+"""Errors and warnings for users of the command line: one sentence on stderr, no traceback."""
 
 from __future__ import annotations
 
@@ -14,13 +14,15 @@ from typing import ParamSpec
 
 import typer
 
-from hybridreg.cli import stop_signals
-from hybridreg.cli.command_line_cures import spoken
-from hybridreg.cli.console import make_ready
-from hybridreg.cli.memory_errors import lacks_memory, memory_sentence, require_addresses
+from hybridreg.cli.terminal import stop_signals
+from hybridreg.cli.terminal.command_line_cures import spoken
+from hybridreg.cli.terminal.console import make_ready
+from hybridreg.cli.terminal.memory_errors import lacks_memory, memory_sentence, require_addresses
 from hybridreg.runtime import optional_packages
 
-BAD_INPUT, VERDICT_FAILED = 2, 3
+# Exit codes.
+BAD_INPUT = 2
+VERDICT_FAILED = 3
 
 P = ParamSpec("P")
 
@@ -30,27 +32,27 @@ _CURES = {
     errno.EDQUOT: "make room, then run the same command again",
     errno.EFBIG: "raise the limit of a file's size (ulimit -f), then run the same command again",
     errno.EROFS: "name another folder",
-    errno.EACCES: "see to the rights, or name another folder",
+    errno.EACCES: "change the permissions, or name another folder",
 }
 
 
 def plainly(command: Callable[P, None]) -> Callable[P, None]:
-    """Make a command end with one sentence and exit code 2 where the input or the machine is at fault, and with 128 + n
-    where signal n stopped it."""
+    """Have a command end with one sentence: exit code 2 where the input or the machine is at fault, 128 + n where
+    signal n stopped it."""
 
     @wraps(command)
     def wrapped(*args: P.args, **kwargs: P.kwargs) -> None:
         make_ready()
         with warnings.catch_warnings(), stop_signals.stoppable():
             warnings.simplefilter("default", UserWarning)
-            # Of workers that are ended early on purpose.
+            # From workers that are stopped early on purpose.
             warnings.filterwarnings("ignore", message=".*tasks which were still being processed")
             warnings.showwarning = _show_warning
             try:
                 require_addresses()
                 command(*args, **kwargs)
-                sys.stdout.flush()  # here, where a full disk behind it can still be told
-            except BrokenPipeError:  # whoever read our output has seen enough
+                sys.stdout.flush()  # here, where a full disk behind it can still be reported
+            except BrokenPipeError:  # the reader of our output has closed the pipe
                 raise
             except KeyboardInterrupt as error:
                 say(f"stopped by {stop_signals.name_of(error)}{stop_signals.how_of(error)}")
@@ -69,7 +71,7 @@ def plainly(command: Callable[P, None]) -> Callable[P, None]:
 
 
 def say(text: str) -> None:
-    """A line on stderr, where that can take one."""
+    """Print a line on stderr, if that is possible."""
     with suppress(OSError):
         print(f"hybridreg: {text}", file=sys.stderr, flush=True)
 
@@ -78,7 +80,7 @@ def sentence(error: BaseException) -> str:
     """An exception's text on one line."""
     if isinstance(error, OSError) and error.strerror:
         cure = _CURES.get(error.errno or 0)
-        # Whatever writes a file of ours names it.
+        # Our own writers name the file.
         name = error.filename or ("standard output" if cure else "")
         text = f"{name}: {error.strerror}" if name else error.strerror
         text += f"; {cure}" if cure else ""

@@ -17,7 +17,7 @@ from hybridreg.cli.app import app
 from hybridreg.io.structured import read_toml
 from hybridreg.runtime import optional_packages
 
-ROOT = Path(__file__).resolve().parent.parent
+ROOT = Path(__file__).resolve().parents[2]
 PROJECT = read_toml(ROOT / "pyproject.toml")["project"]
 EXTRAS = PROJECT["optional-dependencies"]
 HEAVY = (

@@ -12,7 +12,7 @@ import pytest
 
 import hybridreg
 
-ROOT = Path(__file__).resolve().parent.parent
+ROOT = Path(__file__).resolve().parents[2]
 HEAVY = {
     "torch",
     "open3d",

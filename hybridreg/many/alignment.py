@@ -1,0 +1,94 @@
+# SPDX-License-Identifier: MIT
+"""Many clouds in one frame, and whether to believe it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hybridreg.many.links import Link
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Alignment:
+    """What `register_all` returns.
+
+    Attributes
+    ----------
+    names : tuple of str
+    poses : (n, 4, 4) float64
+        Each maps a cloud's points to the reference's coordinates; NaN for clouds that nothing ties to it.
+    reference : int
+    links : tuple of Link
+        Every pair that was registered, and what became of it.
+    reasons : tuple of str
+        What speaks against the result, by name: links that contradict the others, clouds that are not placed, or that
+        hang on one link which nothing confirms.
+    seconds : float
+    """
+
+    names: tuple[str, ...]
+    poses: Array
+    reference: int
+    links: tuple[Link, ...]
+    reasons: tuple[str, ...]
+    seconds: float
+
+    @property
+    def placed(self) -> NDArray[np.bool_]:
+        """Which clouds lie in the common frame, (n,)."""
+        return np.asarray(np.isfinite(self.poses).all(axis=(1, 2)))
+
+    @property
+    def verdict(self) -> str:
+        """Of all together: "ok" where every cloud is placed and two links or more confirm it, "failed" where only the
+        reference is placed, else "doubtful"."""
+        if self.placed.sum() < 2:
+            return "failed"
+        return "ok" if self.placed.all() and not self._hanging() else "doubtful"
+
+    def _hanging(self) -> list[int]:
+        used = [link for link in self.links if link.role in ("tree", "loop")]
+        counts = np.bincount(
+            [k for link in used for k in (link.source, link.target)], minlength=len(self.names)
+        )
+        return [] if len(self.names) < 3 else [int(k) for k in np.flatnonzero((counts < 2) & self.placed)]
+
+    def summary(self) -> str:
+        """A few lines to print."""
+        used = sum(link.role in ("tree", "loop") for link in self.links)
+        lines = [
+            f"{self.verdict}: {int(self.placed.sum())} of {len(self.names)} clouds in the frame of "
+            f"{self.names[self.reference]}, {used} of {len(self.links)} links agree",
+            *(f"- {each}" for each in self.reasons),
+        ]
+        return "\n".join([*lines, f"{self.seconds:.1f} s"])
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain numbers, lists and strings."""
+        return {
+            "verdict": self.verdict,
+            "reference": self.names[self.reference],
+            "poses": {
+                name: pose.tolist() if good else None
+                for name, pose, good in zip(self.names, self.poses, self.placed, strict=True)
+            },
+            "links": [
+                {
+                    "source": self.names[link.source],
+                    "target": self.names[link.target],
+                    "T_target_source": link.T_target_source.tolist(),
+                    "verdict": link.verdict,
+                    "confidence": link.confidence,
+                    "role": link.role,
+                }
+                for link in self.links
+            ],
+            "reasons": list(self.reasons),
+            "seconds": self.seconds,
+        }

@@ -1,0 +1,189 @@
+# SPDX-License-Identifier: MIT
+"""A batch of unlabelled pairs: poses and verdicts in a file that grows, so that what was cut off goes on."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import os
+from collections.abc import Callable, Mapping, Sequence
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hybridreg import changes
+from hybridreg.cloud import PointCloud
+from hybridreg.io.atomic import write_text
+from hybridreg.io.csv_cells import cell
+from hybridreg.io.lock import folder_lock
+from hybridreg.many.jobs import Job
+from hybridreg.many.target import Target
+from hybridreg.output.pose_text import quaternion
+from hybridreg.pair import Pair
+from hybridreg.pipeline import Pipeline
+from hybridreg.runtime.workers import spread
+
+Row = dict[str, Any]
+_ROWS, _TABLE = "rows.jsonl", "poses.csv"
+_COLUMNS = (
+    "id",
+    "source",
+    "target",
+    "verdict",
+    "confidence",
+    "x",
+    "y",
+    "z",
+    "qx",
+    "qy",
+    "qz",
+    "qw",
+    "seconds",
+    "why",
+)
+
+
+def run(
+    jobs: Sequence[Job],
+    out: str | os.PathLike[str],
+    how: Mapping[str, Any],
+    *,
+    seed: int = 0,
+    workers: int | None = None,
+    overwrite: bool = False,
+    nonfinite: str = "raise",
+    target_viewpoint: Any = "auto",
+    on_row: Callable[[Row], None] = lambda row: None,
+) -> list[Row]:
+    """Register every pair that the folder does not hold yet: `rows.jsonl` grows as they are done, `poses.csv` is
+    written at the end.
+
+    Each target is prepared once in each process (`Target`). A pair that cannot be read or registered is a row with its
+    `error`, and verdict "failed".
+
+    Parameters
+    ----------
+    how : what `hybridreg.changes.build` takes: a preset or pipeline, and what differs from it
+    workers : processes; None takes what `joblib.parallel_config` says, else 1
+
+    Returns
+    -------
+    The rows in the order of the jobs.
+
+    Raises
+    ------
+    ValueError
+        The folder holds rows of other settings, or another process writes there.
+    ImportError
+        A package that the pipeline needs is not installed.
+    """
+    folder = Path(out)
+    folder.mkdir(parents=True, exist_ok=True)
+    settings = {"pipeline": changes.build(how).to_spec(), "seed": seed, "nonfinite": nonfinite}
+    settings["target_viewpoint"] = (
+        list(target_viewpoint) if isinstance(target_viewpoint, tuple) else target_viewpoint
+    )
+    with folder_lock(folder):
+        path = folder / _ROWS
+        done = {} if overwrite else _read(path, settings)
+        if not done:
+            write_text(path, json.dumps(settings) + "\n")
+        # One target after another, so that each is prepared once.
+        left = sorted((job for job in jobs if _key(job) not in done), key=lambda job: job.target)
+        work = ((job, json.dumps(settings)) for job in left)
+        with open(path, "a", encoding="utf-8") as file:
+            for row in spread(_one, work, workers, singly=True):
+                file.write(json.dumps(row) + "\n")
+                file.flush()
+                done[(row["id"], row["source"], row["target"])] = row
+                on_row(row)
+        rows = [done[_key(job)] for job in jobs]
+        write_text(folder / _TABLE, _table(rows))
+    return rows
+
+
+def _key(job: Job) -> tuple[str, str, str]:
+    return job.id, job.source, job.target
+
+
+def _read(path: Path, settings: Row) -> dict[tuple[str, str, str], Row]:
+    if not path.is_file():
+        return {}
+    # Whatever follows the last line's end was cut off by a crash.
+    whole, mark, _ = path.read_text(encoding="utf-8").rpartition("\n")
+    lines = whole.split("\n") if mark else []
+    if not lines:
+        return {}
+    try:
+        header, *rows = (json.loads(line) for line in lines)
+        found = {(row["id"], row["source"], row["target"]): row for row in rows}
+    except (ValueError, TypeError, KeyError) as error:
+        raise ValueError(f"{path}: damaged ({error}); add --overwrite to make it anew") from error
+    if header != json.loads(json.dumps(settings)):
+        raise ValueError(
+            f"{path}: was made with other settings; add --overwrite to make it anew, or choose another --out"
+        )
+    write_text(path, "\n".join(lines) + "\n")
+    return found
+
+
+@lru_cache(maxsize=1)
+def _pipeline(settings: str) -> Pipeline:
+    table = json.loads(settings)["pipeline"]
+    return Pipeline(**table)
+
+
+@lru_cache(maxsize=1)
+def _target(path: str, settings: str) -> Target:
+    told = json.loads(settings)
+    return Target(path, nonfinite=told["nonfinite"], viewpoint=told["target_viewpoint"])
+
+
+def _one(job: Job, settings: str) -> Row:
+    row: Row = {
+        **job._asdict(),
+        "verdict": "failed",
+        "confidence": 0.0,
+        "T_target_source": None,
+        "error": None,
+    }
+    told = json.loads(settings)
+    try:
+        source = PointCloud.of(job.source, name="source", nonfinite=told["nonfinite"])
+        pair = Pair.of(source, _target(job.target, settings), id=job.id)
+        result = _pipeline(settings).run(pair, seed=told["seed"])
+    except (ValueError, OSError, MemoryError) as error:
+        return {
+            **row,
+            "error": " ".join(str(error).split()) or type(error).__name__,
+            "reasons": [],
+            "seconds": 0.0,
+        }
+    return {
+        **row,
+        "verdict": result.verdict,
+        "confidence": result.confidence,
+        "T_target_source": result.transformation.tolist(),
+        "scale": result.scale,
+        "reasons": list(result.reasons),
+        "notes": list(result.notes),
+        "seconds": sum(result.seconds.values()),
+    }
+
+
+def _table(rows: Sequence[Row]) -> str:
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(_COLUMNS)
+    for row in rows:
+        pose: list[Any] = [""] * 7
+        if row["T_target_source"] is not None:
+            T = np.array(row["T_target_source"])
+            pose = [repr(float(x)) for x in (*T[:3, 3], *quaternion(T[:3, :3]))]
+        why = row["error"] or "; ".join(row["reasons"])
+        told = (row["id"], row["source"], row["target"], row["verdict"], f"{row['confidence']:.3f}", *pose)
+        writer.writerow([cell(each) for each in (*told, f"{row['seconds']:.3f}", why)])
+    return text.getvalue()

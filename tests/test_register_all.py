@@ -1,0 +1,184 @@
+# SPDX-License-Identifier: MIT
+"""Many clouds into one frame: tours with a wrong link, shuffled scans, another place, real sequences."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import hybridreg as hr
+from hybridreg.data.hard import box_world
+from hybridreg.data.loaders.folder import load_pair
+from hybridreg.geometry import se3
+from hybridreg.many.links import Link, best_tree, groups, placed
+from hybridreg.runtime.open3d import load_open3d
+
+
+@pytest.fixture(autouse=True)
+def open3d() -> None:
+    try:
+        load_open3d()
+    except ImportError as error:
+        pytest.skip(str(error))
+
+
+def tour(n: int, seed: int = 11, length: float = 48.0) -> tuple[list[np.ndarray], np.ndarray]:
+    """Scans along a made street by three kinds of sensors in turn, and their poses in the first one's frame."""
+    rng = np.random.default_rng(seed)
+    world = box_world.street(rng, crossing=True)
+    poses = [
+        box_world.sensor_pose(x, rng.uniform(-2, 2), 1.8, rng.uniform(-180, 180), rng.normal(0, 1))
+        for x in np.linspace(-length, length, n)
+    ]
+    sensors = ("rings32", "rings64", "rings16")
+    scans = [box_world.scan(world, sensors[k % 3], T, rng, density=0.8) for k, T in enumerate(poses)]
+    return scans, np.array([se3.inverse(poses[0]) @ T for T in poses])
+
+
+def off(found: hr.Alignment, truth: np.ndarray) -> float:
+    """Metres between the placed sensors and the true ones, at most."""
+    return float(np.linalg.norm(found.poses[:, :3, 3] - truth[:, :3, 3], axis=1).max())
+
+
+def test_a_tour_of_twenty_scans_survives_a_wrong_link() -> None:
+    scans, truth = tour(20)
+    wrong = se3.inverse(truth[9]) @ truth[10] @ se3.from_rt(np.eye(3), np.array([4.0, 2.0, 0.0]))
+    found = hr.register_all(scans, known={(10, 9): wrong})
+    assert found.verdict == "ok", found.summary()
+    assert off(found, truth) < 0.1
+    assert [(link.source, link.target) for link in found.links if link.role == "contradicts"] == [(10, 9)]
+    assert any("cloud 10 -> cloud 9 (given) contradicts" in reason for reason in found.reasons)
+    assert "cloud 10 -> cloud 9" in found.summary()
+    told = json.loads(json.dumps(found.to_dict()))
+    np.testing.assert_allclose(told["poses"]["cloud 19"], found.poses[19])
+
+
+def test_shuffled_scans_another_reference_and_workers() -> None:
+    scans, truth = tour(6, length=18.0)
+    order = [3, 0, 5, 1, 4, 2]
+    shuffled = [scans[k] for k in order]
+    found = hr.register_all(shuffled, ordered=False, reference=2, names=[f"s{k}" for k in order])
+    wanted = se3.inverse(truth[5]) @ truth[order]
+    assert found.placed.all(), found.summary()
+    assert off(found, wanted) < 0.1
+    np.testing.assert_array_equal(found.poses[2], np.eye(4))
+    again = hr.register_all(shuffled, ordered=False, reference=2, workers=2)
+    np.testing.assert_array_equal(found.poses, again.poses)
+
+
+def test_a_cloud_of_another_place_is_left_out_by_name() -> None:
+    scans, truth = tour(4, length=12.0)
+    elsewhere = box_world.scan(
+        box_world.wood(np.random.default_rng(3)),
+        "rings32",
+        box_world.sensor_pose(0, 0, 1.8, 0),
+        np.random.default_rng(4),
+    )
+    found = hr.register_all([*scans[:2], elsewhere, *scans[2:]], names=["a", "b", "lost", "c", "d"])
+    assert found.placed.tolist() == [True, True, False, True, True], found.summary()
+    assert found.verdict == "doubtful"
+    assert any(reason.startswith("lost is not placed") for reason in found.reasons)
+    assert off_of(found, [0, 1, 3, 4], truth) < 0.1
+
+
+def off_of(found: hr.Alignment, rows: list[int], truth: np.ndarray) -> float:
+    return float(np.linalg.norm(found.poses[rows][:, :3, 3] - truth[:, :3, 3], axis=1).max())
+
+
+def test_a_real_sequence(real_data: Path) -> None:
+    pairs = {
+        name: load_pair(real_data / f"sustech-{name}") for name in ("965-to-950", "970-to-965", "975-to-965")
+    }
+    to_950 = pairs["965-to-950"].T_target_source
+    truth = np.array([
+        np.eye(4), to_950, to_950 @ pairs["970-to-965"].T_target_source, to_950 @ pairs["975-to-965"].T_target_source
+    ])  # fmt: skip
+    clouds = [pairs["965-to-950"].pair.target, *(pairs[name].pair.source for name in pairs)]
+    found = hr.register_all(clouds)
+    assert found.placed.all()
+    assert off(found, truth) < 0.2  # the ground truth is good to 5 cm a pair
+    assert all(link.role in ("tree", "loop") for link in found.links), found.summary()
+
+
+def test_the_work_may_be_spread_over_dask() -> None:
+    distributed = pytest.importorskip("distributed")
+    import joblib
+
+    scans, _ = tour(3, length=6.0)
+    here = hr.register_all(scans, preset="birdseye-gicp")
+    with (
+        distributed.LocalCluster(
+            n_workers=1, threads_per_worker=1, processes=False, dashboard_address=None
+        ) as cluster,
+        distributed.Client(cluster),
+        joblib.parallel_config(backend="dask"),
+    ):
+        there = hr.register_all(scans, preset="birdseye-gicp")
+    np.testing.assert_array_equal(here.poses, there.poses)
+
+
+@pytest.mark.parametrize("wrong, word", [
+    ({"clouds": [np.zeros((30, 3))]}, "1 given, two or more"),
+    ({"reference": 9}, "reference=9"),
+    ({"names": ["a", "a", "b"]}, "each needs one of its own"),
+    ({"names": ["a"]}, "names: 1 given for 3"),
+    ({"known": {(0, 3): np.eye(4)}}, r"known: \(0, 3\) are no two rows"),
+    ({"known": {(1, 1): np.eye(4)}}, r"known: \(1, 1\)"),
+    ({"known": {(0, 1): np.zeros((4, 4))}}, r"known\[0, 1\]"),
+    ({"seed": -1}, "seed=-1"),
+])  # fmt: skip
+def test_what_cannot_be_is_refused(wrong: dict[str, Any], word: str) -> None:
+    rng = np.random.default_rng(0)
+    arguments: dict[str, Any] = {"clouds": [rng.normal(size=(100, 3)) for _ in range(3)], **wrong}
+    with pytest.raises(ValueError, match=word):
+        hr.register_all(arguments.pop("clouds"), **arguments)
+
+
+def test_a_bad_cloud_is_told_by_its_name() -> None:
+    rng = np.random.default_rng(0)
+    with pytest.raises(ValueError, match="cloud 1: .*points"):
+        hr.register_all([rng.normal(size=(100, 3)), np.zeros((5, 3))])
+
+
+# --- without clouds: which tree is taken
+
+
+def graph(n: int, wrong: int, seed: int) -> tuple[np.ndarray, list[Link], set[tuple[int, int]]]:
+    """A ring of poses with chords; `wrong` links are metres off. Links, and which are wrong."""
+    rng = np.random.default_rng(seed)
+    angles = 2.0 * np.pi * np.arange(n) / n
+    places = 20.0 * np.column_stack([np.cos(angles), np.sin(angles), np.zeros(n)])
+    poses = np.array(
+        [se3.from_rt(se3.yaw(np.degrees(a))[:3, :3], place) for a, place in zip(angles, places, strict=True)]
+    )
+    rows = [(k, (k + step) % n) for step in (1, 2, 3) for k in range(n)]
+    bad = {rows[k] for k in rng.permutation(len(rows))[:wrong]}
+    links = []
+    for a, b in rows:
+        T = se3.inverse(poses[b]) @ poses[a]
+        T[:3, 3] += rng.normal(0, 0.02, 3) + ([5.0, rng.uniform(-5, 5), 0.0] if (a, b) in bad else [0, 0, 0])
+        links.append(Link(source=a, target=b, T_target_source=T, verdict="ok", confidence=1.0, metres=0.5))
+    return se3.inverse(poses[0]) @ poses, links, bad
+
+
+@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("wrong", [0, 1, 4, 8])
+def test_the_tree_with_which_most_links_agree(wrong: int, seed: int) -> None:
+    truth, links, bad = graph(20, wrong, seed)
+    tree, fit, root = best_tree(20, links, np.zeros((20, 3)), np.random.default_rng(0))
+    left_out = {(link.source, link.target) for link in links if link not in fit}
+    assert left_out == bad
+    poses = placed(20, tree, root)
+    step = se3.inverse(poses[0]) @ poses
+    assert np.linalg.norm(step[:, :3, 3] - truth[:, :3, 3], axis=1).max() < 0.4
+
+
+def test_groups_that_nothing_joins() -> None:
+    _, links, _ = graph(8, 0, 0)
+    some = [link for link in links if (link.source < 5) == (link.target < 5)]
+    assert groups(8, some) == [[0, 1, 2, 3, 4], [5, 6, 7]]
+    assert np.isnan(placed(8, some[:1], 0)[7]).all()
