@@ -4,7 +4,7 @@ CONSTRAINTS ?= constraints.txt
 BIN := .venv/bin
 DATA ?= ../shared/data/real
 
-.PHONY: install demo test light dist lint types bench clean
+.PHONY: install demo test light dist lint types docs bench clean
 
 install: .venv/installed
 
@@ -41,8 +41,17 @@ types: install
 	cd build/types/lib/python3*/site-packages && ls -d "$(CURDIR)"/.venv/lib/python3*/site-packages > borrowed.pth
 	cd build && ../$(BIN)/mypy --config-file ../pyproject.toml --python-executable types/bin/python -p hybridreg
 
+# The site, in an environment of its own: it reads the sources and imports nothing of them.
+docs: .venv-docs/installed
+	NO_MKDOCS_2_WARNING=1 .venv-docs/bin/mkdocs build --strict
+
+.venv-docs/installed: docs/requirements.txt
+	$(PYTHON) -m venv .venv-docs
+	.venv-docs/bin/python -m pip install --quiet --requirement docs/requirements.txt
+	touch $@
+
 bench: install
 	$(BIN)/python -m benchmarks --data $(DATA)
 
 clean:
-	rm -rf .venv build out
+	rm -rf .venv .venv-docs build out
