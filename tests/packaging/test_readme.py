@@ -29,10 +29,10 @@ NOT_RUN = {
     "hybridreg train mine.toml": "needs data of yours",
     "torchrun": "takes hours",
     "hybridreg train paper": "needs the paper's data set and a GPU",
-    "hybridreg table ablation": "makes and runs 50 pairs",
-    "hybridreg table estimators": "makes and runs 50 pairs",
+    "hybridreg table table2": "makes and runs 50 pairs",
     "hybridreg table stages": "makes and runs 50 pairs",
-    "hybridreg report runs/ablation": "needs the table above it",
+    "hybridreg figure registrations runs/table4": "needs a table of 50 pairs",
+    "hybridreg report runs/table4": "needs a table of 50 pairs",
     'mine = "runs/mine/best"': "needs weights of your own training",
 }
 
