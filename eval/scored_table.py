@@ -86,5 +86,6 @@ class Table:
         n = max((len(entry.rows) for entry in self.entries), default=0)
         runs = f"{n} pairs"
         if self.starts:
-            runs = f"{n // (self.starts + 1)} pairs, each as it is and under {self.starts} random yaw starts, {n} runs"
+            pairs = n // (self.starts + 1)
+            runs = f"{pairs} pairs, each as it is and under {self.starts} random yaw rotations, {n} runs"
         return f"{self.title}. Data {self.data or 'unnamed'}, {runs}; {protocol.describe()}"

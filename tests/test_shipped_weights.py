@@ -73,10 +73,10 @@ def test_own_weights_take_the_place_of_missing_ones(drop: Path, tmp_path: Path) 
     mine = drop / "cross3dreg-small"
     mine.rename(tmp_path / "mine")
     own = {"weights": str(tmp_path / "mine")}
-    built = changes.build({"preset": "cross3dreg", "overlap": own, "match": own})
+    built = changes.build({"preset": "cross3dreg", "overlap": own, "match": own, "estimate": own})
     assert (built.overlap.weights, built.match.weights) == (own["weights"], own["weights"])
     with pytest.raises(shipped_weights.MissingWeights, match=r"--set overlap\.weights=FOLDER$"):
-        changes.build({"preset": "cross3dreg", "match": own})
+        changes.build({"preset": "cross3dreg", "match": own, "estimate": own})
 
 
 def test_half_a_folder_is_no_weights(package: Path) -> None:

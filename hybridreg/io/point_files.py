@@ -119,7 +119,7 @@ def read_recorded(path: str | os.PathLike[str], selection: Selection = ANY) -> R
         Also where a cloud is chosen from a file that holds one.
     """
     path = Path(path)
-    if path.is_dir() and (path / "metadata.yaml").is_file():
+    if _is_folder(path) and (path / "metadata.yaml").is_file():
         return read_bag(path, selection)
     check_file(path)
     suffix = _suffix(str(path))
@@ -135,9 +135,16 @@ def read_recorded(path: str | os.PathLike[str], selection: Selection = ANY) -> R
     return Recorded(parse_points(read_whole(path), str(path)))
 
 
+def _is_folder(path: Path) -> bool:
+    try:
+        return path.is_dir()
+    except OSError:  # a name that no file can have: `check_file` says so
+        return False
+
+
 def holds_several(path: str | os.PathLike[str]) -> bool:
     """Whether a file may hold several clouds, to choose from by a `Selection`."""
-    return _suffix(os.fspath(path)) in _SEVERAL or Path(path).is_dir()
+    return _suffix(os.fspath(path)) in _SEVERAL or _is_folder(Path(path))
 
 
 def read_viewpoint(path: str | os.PathLike[str]) -> NDArray[np.float64] | None:

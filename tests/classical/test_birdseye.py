@@ -101,7 +101,7 @@ def balls(n: int, radius: float, seed: int = 0) -> np.ndarray:
     return radius * directions / np.linalg.norm(directions, axis=1, keepdims=True)
 
 
-@pytest.mark.parametrize(("tilt", "word"), [(0.0, "upright"), (180.0, "on its head")])
+@pytest.mark.parametrize(("tilt", "word"), [(0.0, "upright"), (180.0, "upside down")])
 def test_a_source_without_ground_is_taken_to_hang_as_the_target_does(tilt: float, word: str) -> None:
     target = seen(block(), pose(0.0, 0.0, 0.0, tilt))
     found, scene = run(hr.Pair.of(balls(3000, 12.0), target))

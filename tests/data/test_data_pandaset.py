@@ -75,7 +75,7 @@ def test_pairs_by_frames_or_metres(tree: tuple[Path, Any]) -> None:
     assert PandaSet(root, frames=3).ids == ("005/00-03", "005/03-06", "005/06-09", "005/09-12")
     assert PandaSet(root, metres=5.0).ids == ("005/00-06", "005/06-12")
     assert len(PandaSet(root, metres=0.0)) == 14
-    with pytest.raises(ValueError, match="no pairs come of it"):
+    with pytest.raises(ValueError, match="it gives no pairs"):
         PandaSet(root, metres=500.0)
     with pytest.raises(ValueError, match="frames=-1"):
         PandaSet(root, frames=-1)

@@ -47,7 +47,7 @@ def read_records(path: Path) -> list[Record]:
         kind = type(content).__name__
         raise fault(
             name,
-            f"holds a {kind} that is no list of dictionaries",
+            f"holds a {kind}, not a list of dictionaries",
             "give the data set's own list, or name its columns: seq_id, frame0, frame1, transform, pcd0, pcd1",
         )
     if len(content) == 0:

@@ -101,9 +101,9 @@ def test_a_published_checkpoint_is_a_stage(trained: str, scene: Scene, tmp_path:
     assert np.allclose(found.target, want.target)
     with pytest.raises(ValueError, match="say normalize=True or normalize=False"):
         hr.Fcgf(weights=str(tmp_path / "fcgf.pth")).network()
-    with pytest.raises(ValueError, match=r"normalize=True: the weights .* bring their own configuration"):
+    with pytest.raises(ValueError, match=r"normalize=True: the weights .* have their own configuration"):
         hr.Fcgf(weights=trained, normalize=True).network()
-    with pytest.raises(ValueError, match=r"size='small': the weights .* bring their own"):
+    with pytest.raises(ValueError, match=r"size='small': the weights .* have their own"):
         hr.Fcgf(weights=trained, size="small").network()
 
 

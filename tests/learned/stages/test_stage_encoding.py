@@ -111,7 +111,7 @@ def test_without_an_image_omp_says_that_it_knows_nothing() -> None:
     scene = scene_of(0.5, image=False)
     overlap = OMP(scene)
     assert (overlap.source == 1.0).all()
-    assert any("every point counts" in note for note in scene.notes)
+    assert any("every point takes part" in note for note in scene.notes)
     assert len(VGAM(scene, overlap))
 
 

@@ -74,7 +74,7 @@ def test_trained_weights(weights: dict[str, str], tmp_path: Path) -> None:
     )
     with pytest.raises(ValueError, match="weights of the network 'cofinet', not of 'predator'"):
         hr.Predator.from_pretrained(weights["cofinet"])
-    with pytest.raises(ValueError, match="bring their own configuration"):
+    with pytest.raises(ValueError, match="have their own configuration"):
         hr.Predator.from_pretrained(weights["predator"], size="nano")
 
 

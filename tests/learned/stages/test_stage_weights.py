@@ -84,7 +84,7 @@ def test_weights_of_another_network_are_refused(make_weights: MakeWeights) -> No
         hr.Vgam.from_pretrained(plain)
     with pytest.raises(ValueError, match=r"were trained with a visual-geometric attention.*Vgam"):
         hr.GeoTransformer.from_pretrained(cross)
-    with pytest.raises(ValueError, match="bring their own configuration"):
+    with pytest.raises(ValueError, match="have their own configuration"):
         hr.GeoTransformer.from_pretrained(plain, size="nano")
 
 
