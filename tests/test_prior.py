@@ -145,7 +145,7 @@ def test_scale_is_estimated(demo: Any, factor: float) -> None:
     "wrong, word",
     [
         ({"init": np.eye(3)}, r"init: expected shape \(4, 4\)"),
-        ({"init": np.diag([2.0, 2.0, 2.0, 1.0])}, "init: .*no rotation"),
+        ({"init": np.diag([2.0, 2.0, 2.0, 1.0])}, "init: .*not a rotation"),
         ({"init": "nowhere.txt"}, "nowhere.txt"),
         ({"max_translation": 0.0}, "max_translation=0.0 must be a positive"),
         ({"max_translation": np.nan}, "max_translation=nan"),

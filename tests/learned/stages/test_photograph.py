@@ -14,7 +14,7 @@ from hybridreg.data import open_dataset
 from hybridreg.pair import Pair
 
 PAGE = Path(__file__).resolve().parents[3] / "README.md"
-CLAIM = "The photograph does nothing in these weights yet"
+CLAIM = "The camera image has no effect in these weights yet"
 
 
 def moves_matches(pair: Pair) -> bool:
