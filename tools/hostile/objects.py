@@ -126,7 +126,7 @@ MAKE: dict[str, Callable[[Array], Any]] = {
     "frame without names": lambda p: Frame(dict(enumerate(p.T))),  # type: ignore[arg-type]
     "frame of others": lambda p: Frame(_by_axis(p, "abc")),
     "frame of nothing": lambda p: Frame({}),
-    "mappings": lambda p: [_by_axis(row[:, None], "xyz") for row in p],
+    "mappings": lambda p: [_by_axis(row, "xyz") for row in p],
     "named tuples": lambda p: [_Return(1, *row) for row in p.tolist()],
     "objects": lambda p: [SimpleNamespace(x=a, y=b, z=c) for a, b, c in p.tolist()],
     "objects of unlike kinds": lambda p: [SimpleNamespace(x=1.0, y=2.0, z=3.0), *p.tolist()],
