@@ -17,9 +17,10 @@ import pytest
 from hybridreg.data import open_dataset
 from hybridreg.data.lists import direction
 from hybridreg.data.lists.azimuth import coverage
+from hybridreg.data.lists.drive_splits import split_of
 from hybridreg.data.lists.frame_pickles import read_columns
 from hybridreg.data.loaders import pandaset
-from hybridreg.data.loaders.pandaset import PandaSet, split_of
+from hybridreg.data.loaders.pandaset import PandaSet
 from hybridreg.geometry import se3
 
 

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hybridreg.data.lists import required_files
+from hybridreg.data.lists import drive_splits, required_files
 from hybridreg.data.lists.listed import ListedPairs
 from hybridreg.data.lists.pair_files import PairFiles
 from hybridreg.data.lists.trajectories import rigid
@@ -22,7 +22,6 @@ from hybridreg.io.structured import read_json
 Array = NDArray[np.float64]
 
 _ROAD, _CAR = "infrastructure-side", "vehicle-side"
-_SPLITS = ("train", "val", "test", "all")
 CURE = "the archive's own calibration maps each LiDAR to the world; take it anew from its authors"
 
 
@@ -52,8 +51,7 @@ class DairV2x(ListedPairs):
     """
 
     def __init__(self, root: str | os.PathLike[str], split: str = "test", distance: float = 0.0) -> None:
-        if split not in _SPLITS:
-            raise ValueError(f"split={split!r}: DAIR-V2X has {', '.join(_SPLITS)}")
+        drive_splits.check_split(split, "DAIR-V2X")
         if not distance >= 0.0:
             raise ValueError(f"distance={distance} must not be negative")
         base = required_files.folder(Path(root), "DAIR-V2X")
@@ -66,20 +64,12 @@ class DairV2x(ListedPairs):
         for n, row in enumerate(rows):
             label = f"{listed}, pair {n}"
             car = _frame(row, "vehicle", label)
-            if split != "all" and split_of(drives.get(car, "")) != split:
+            if split != "all" and drive_splits.split_of(drives.get(car, "")) != split:
                 continue
             entry = _entry(base, row, _frame(row, "infrastructure", label), car, label)
             if not distance or np.linalg.norm(entry.T_target_source[:3, 3]) <= distance:
                 entries.append(entry)
         super().__init__(entries, listed, if_inverted=CURE, fields=tuple(map(str, rows[0])))
-
-
-def split_of(drive: str) -> str:
-    """The split of a drive by its number; empty where it has none."""
-    last = drive[-1:]
-    if not last.isdecimal():
-        return ""
-    return "test" if last in "05" else "val" if last == "9" else "train"
 
 
 def _entry(base: Path, row: Mapping[str, Any], road: str, car: str, label: str) -> PairFiles:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from hybridreg.cloud import PointCloud
-from hybridreg.data.lists import required_files
+from hybridreg.data.lists import drive_splits, required_files
 from hybridreg.data.lists.frame_pairs import pairs_across
 from hybridreg.data.lists.frame_pickles import read_columns
 from hybridreg.data.lists.listed import ListedPairs
@@ -30,7 +30,6 @@ _SPINNING, _FORWARD = 0, 1  # values of the column d
 _SENSORS = {_SPINNING: "Hesai Pandar64", _FORWARD: "Hesai PandarGT"}
 # Points of both sensors nearer to the sensor than this, metres, are the car's own roof.
 _ROOF = 2.5
-_SPLITS = ("train", "val", "test", "all")
 
 
 def _extrinsic(w: float, x: float, y: float, z: float, t: tuple[float, float, float]) -> Array:
@@ -81,8 +80,7 @@ class PandaSet(ListedPairs):
         self, root: str | os.PathLike[str], split: str = "test", metres: float = 10.0, frames: int = 0
     ) -> None:
         base = required_files.folder(Path(root), "PandaSet")
-        if split not in _SPLITS:
-            raise ValueError(f"split={split!r}: PandaSet has {', '.join(_SPLITS)}")
+        drive_splits.check_split(split, "PandaSet")
         if frames < 0 or not metres >= 0.0:
             raise ValueError(f"frames={frames} and metres={metres} must not be negative")
         drives = sorted(
@@ -92,7 +90,11 @@ class PandaSet(ListedPairs):
         )
         if not drives:
             raise FileNotFoundError(f"PandaSet is missing: {base} has no NNN/lidar/poses.json")
-        chosen = [drive for drive in drives if split in ("all", split_of(drive.resolve().name))]
+        chosen = [
+            drive
+            for drive in drives
+            if split in ("all", drive_splits.split_of(drive.resolve().name, without="train"))
+        ]
         if not chosen:
             names = ", ".join(drive.resolve().name for drive in drives[:8])
             raise ValueError(
@@ -123,12 +125,6 @@ class PandaSet(ListedPairs):
             },
         )
         return LabelledPair(pair=pair, T_target_source=entry.T_target_source)
-
-
-def split_of(sequence: str) -> str:
-    """The split of a sequence by its name, "001"."""
-    last = sequence[-1:]
-    return "test" if last in ("0", "5") else "val" if last == "9" else "train"
 
 
 def _entries(drive: Path, metres: float, frames: int) -> Iterator[PairFiles]:
