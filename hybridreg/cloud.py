@@ -124,6 +124,10 @@ class PointCloud:
             guess=None if place is None else place - offset,
         )
 
+    def keeping(self) -> PointCloud:
+        """The cloud as a prepared target: where it was seen from is settled, and `once` keeps what it makes."""
+        return replace(self, said=self.seen, kept={})
+
     def once(self, key: Hashable, make: Callable[[], Value]) -> Value:
         """`make()`; of a prepared target what it gave the first time."""
         if self.kept is None:

@@ -14,6 +14,7 @@ from scipy.spatial import cKDTree
 
 from hybridreg.cloud import PointCloud
 from hybridreg.geometry import ground, normals
+from hybridreg.geometry import viewpoint as seen_from
 from hybridreg.geometry.ground import Ground
 from hybridreg.geometry.voxel_cells import voxel_centroids
 from hybridreg.matches import Correspondences
@@ -70,10 +71,7 @@ class Level:
     @cached_property
     def centre(self) -> Array:
         """Where the cloud was seen from, (3,): the middle of several places; of the points where none is known."""
-        if self.viewpoint is None:
-            middle: Array = np.median(self.points, axis=0)
-            return middle
-        return self.viewpoint if self.viewpoint.ndim == 1 else self.viewpoint.mean(axis=0)
+        return seen_from.centre(self.points, self.viewpoint)
 
     def normals(self, k: int = 20) -> Array:
         """Normals (n, 3) from each point's k nearest neighbours, towards the sensor."""

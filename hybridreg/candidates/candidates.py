@@ -21,7 +21,7 @@ from hybridreg.matches import Correspondences, EntryTrace, Overlap, Pose
 from hybridreg.resolution import comparable, size_ratio
 from hybridreg.scene import Scene
 from hybridreg.search.basin_hopping import hop
-from hybridreg.search.hypothesis import Hypothesis, as_pose
+from hybridreg.search.hypothesis import Hypothesis, as_hypotheses, as_pose
 from hybridreg.search.pattern_search import climb
 from hybridreg.search.ranking import HOPELESS, counted, distinct
 from hybridreg.search.settle import best_first, second_look
@@ -197,10 +197,9 @@ _AGAIN = "second look"
 
 def _starts(scene: Scene, pose: Pose) -> list[Hypothesis | Array]:
     # What an entry offers, within the pair's bounds; its best beyond them, where nothing else is left.
-    offered = list(pose.hypotheses or [pose.T, *pose.rivals])
-    poses = [pose.T, *pose.rivals]
-    allowed = [one for one, T in zip(offered, poses, strict=True) if scene.pair.allows(T)]
-    return (allowed or offered[:1])[:_LOOKED_AT]
+    starts = as_hypotheses(pose)
+    allowed = [one for one, T in zip(starts, [pose.T, *pose.rivals], strict=True) if scene.pair.allows(T)]
+    return (allowed or starts[:1])[:_LOOKED_AT]
 
 
 def _polished(scene: Scene, found: list[Hypothesis]) -> list[Hypothesis]:

@@ -52,11 +52,7 @@ class Ground(NamedTuple):
     @property
     def levelling(self) -> Array:
         """(3, 3): the shortest turn that brings `up` to z."""
-        z = np.array([0.0, 0.0, 1.0])
-        axis = np.cross(self.up, z)
-        sine, cosine = float(np.linalg.norm(axis)), float(self.up @ z)
-        direction = axis / sine if sine > 1e-9 else np.array([1.0, 0.0, 0.0])
-        return se3.rotation_about(np.arctan2(sine, cosine) * direction)
+        return se3.turn_to_z(self.up)
 
 
 def under(points: Array, viewpoint: Array | None, spacing: float) -> Ground | None:

@@ -130,3 +130,12 @@ def check(T: Any, name: str = "T", tolerance: float = 1e-4) -> Array:
             f"determinant {determinant:.3g}); remove scale or reflection"
         )
     return matrix
+
+
+def turn_to_z(up: Array) -> Array:
+    """The shortest rotation (3, 3) that brings a unit vector (3,) to z; about x where it points the other way."""
+    z = np.array([0.0, 0.0, 1.0])
+    axis = np.cross(up, z)
+    sine, cosine = float(np.linalg.norm(axis)), float(up @ z)
+    direction = axis / sine if sine > 1e-9 else np.array([1.0, 0.0, 0.0])
+    return rotation_about(np.arctan2(sine, cosine) * direction)

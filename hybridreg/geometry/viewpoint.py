@@ -186,3 +186,11 @@ def _against_height(points: Array, jumps: float) -> str:
     if abs(height) >= lowest or differing(*_rays(points - _LIFT * lowest * plane.up)) > _FEWER * jumps:
         return ""
     return f"its origin lies in the ground ({height:+.2f} m over it)"
+
+
+def centre(points: Array, viewpoint: Array | None) -> Array:
+    """Where points (n, 3) were seen from, (3,): the middle of several places; of the points where none is known."""
+    if viewpoint is None:
+        middle: Array = np.median(points, axis=0)
+        return middle
+    return viewpoint if viewpoint.ndim == 1 else viewpoint.mean(axis=0)

@@ -19,10 +19,8 @@ Array = NDArray[np.float64]
 _POINTS, _ARM = 100.0, 10.0
 
 
-def optimised(
-    poses: Array, tree: Sequence[Link], loops: Sequence[Link], reference: int
-) -> tuple[Array, list[Link]]:
-    """Poses (n, 4, 4) after optimisation, and the loops that were dropped on the way.
+def optimised(poses: Array, tree: Sequence[Link], loops: Sequence[Link], reference: int) -> Array:
+    """Poses (n, 4, 4) after optimisation.
 
     Parameters
     ----------
@@ -58,10 +56,8 @@ def optimised(
         registration.GlobalOptimizationConvergenceCriteria(),
         option,
     )
-    kept = {(edge.source_node_id, edge.target_node_id) for edge in graph.edges}
-    dropped = [link for link in loops if (link.source, link.target) not in kept]
     found = np.array([np.asarray(node.pose) for node in graph.nodes])
     found = se3.inverse(found[reference]) @ poses[reference] @ found if len(found) else found
     for pose in found:
         pose[:3, :3] = se3.project(pose[:3, :3])
-    return found, dropped
+    return found

@@ -16,6 +16,7 @@ from hybridreg import fitting
 from hybridreg.cloud import PointCloud
 from hybridreg.geometry import se3
 from hybridreg.geometry.extent import reach
+from hybridreg.geometry.viewpoint import centre
 from hybridreg.many.alignment import Alignment
 from hybridreg.many.links import Link, agrees, best_tree, groups, placed
 from hybridreg.many.overlap_guess import signature, unlike
@@ -80,7 +81,7 @@ def register_all(
     told = _names(clouds, names)
     if not 0 <= reference < len(clouds):
         raise ValueError(f"reference={reference} must be a row of the {len(clouds)} clouds")
-    held = [_prepared(cloud, name) for cloud, name in zip(clouds, told, strict=True)]
+    held = [PointCloud.of(cloud, name=name).keeping() for cloud, name in zip(clouds, told, strict=True)]
     middles = np.array([np.median(cloud.points, axis=0) + cloud.offset for cloud in held])
     pipeline = Pipeline.preset(preset, voxel=voxel)
     links = [_given(rows, T, len(held)) for rows, T in (known or {}).items()]
@@ -132,11 +133,6 @@ def _names(clouds: Sequence[Any], names: Sequence[str] | None) -> tuple[str, ...
     if len(names) != len(clouds) or len(set(names)) != len(names):
         raise ValueError(f"names: {len(names)} given for {len(clouds)} clouds; each needs one of its own")
     return tuple(names)
-
-
-def _prepared(cloud: Any, name: str) -> PointCloud:
-    checked = PointCloud.of(cloud, name=name)
-    return replace(checked, said=checked.seen, kept={})
 
 
 def _given(rows: Rows, T: Any, n: int) -> Link:
@@ -208,7 +204,7 @@ def _neighbours(held: Sequence[PointCloud], poses: Array, tried: set[Rows]) -> l
     # Where each cloud was seen from, in the common frame; its nearest others, as long as both see there.
     eyes = np.array(
         [
-            se3.apply(pose, (_eye(cloud) + cloud.offset)[None])[0]
+            se3.apply(pose, (centre(cloud.points, cloud.viewpoint) + cloud.offset)[None])[0]
             if np.isfinite(pose).all()
             else np.full(3, np.nan)
             for cloud, pose in zip(held, poses, strict=True)
@@ -224,31 +220,19 @@ def _neighbours(held: Sequence[PointCloud], poses: Array, tried: set[Rows]) -> l
     return pairs
 
 
-def _eye(cloud: PointCloud) -> Array:
-    place = cloud.viewpoint
-    if place is None:
-        middle: Array = np.median(cloud.points, axis=0)
-        return middle
-    return place if place.ndim == 1 else place.mean(axis=0)
-
-
 def _optimised(n: int, tree: Sequence[Link], fit: Sequence[Link], root: int, reference: int) -> Array:
     poses = placed(n, tree, root)
     rows = np.flatnonzero(np.isfinite(poses[:, 0, 0]))
     row_of = {int(k): place for place, k in enumerate(rows)}
-    here = [
-        replace(link, source=row_of[link.source], target=row_of[link.target])
-        for link in fit
-        if link.source in row_of
-    ]
-    own = [
-        link
-        for link, of in zip(here, [link for link in fit if link.source in row_of], strict=True)
-        if of in tree
-    ]
-    loops = [link for link in here if link not in own]
+    reached = [link for link in fit if link.source in row_of]
+
+    def in_rows(links: Iterable[Link]) -> list[Link]:
+        return [replace(link, source=row_of[link.source], target=row_of[link.target]) for link in links]
+
+    loops = in_rows(link for link in reached if link not in tree)
     if len(rows) > 2 and loops:
-        poses[rows], _ = optimised(poses[rows], own, loops, row_of.get(reference, 0))
+        own = in_rows(link for link in reached if link in tree)
+        poses[rows] = optimised(poses[rows], own, loops, row_of.get(reference, 0))
     if not np.isfinite(poses[reference, 0, 0]):  # nothing ties the reference to the others
         alone = np.full((n, 4, 4), np.nan)
         alone[reference] = np.eye(4)

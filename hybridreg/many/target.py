@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any, Literal
 
 from hybridreg import api
@@ -39,7 +38,7 @@ class Target:
         select: Selection = ANY,
     ) -> None:
         checked = PointCloud.of(cloud, name="target", nonfinite=nonfinite, viewpoint=viewpoint, select=select)
-        self.prepared = replace(checked, said=checked.seen, kept={})
+        self.prepared = checked.keeping()
 
     def __len__(self) -> int:
         return len(self.prepared)

@@ -118,10 +118,10 @@ class Prior:
         size = size_search.found(pair.with_clouds(source, target)) if self.scale else size_search.Size()
         source = placing.sized(source, size.scale)
         up_source, up_target = self._verticals()
-        level = se3.from_rt(_turn_to_z(up_target), np.zeros(3))
+        level = _levelling(up_target)
         T_placed_source = level @ start
         if self.init is None:
-            T_placed_source = se3.from_rt(_turn_to_z(up_source), np.zeros(3))
+            T_placed_source = _levelling(up_source)
         source, target = placing.moved(source, T_placed_source), placing.moved(target, level)
         centre = np.median(source.points, axis=0)
         bounds = PoseBounds(
@@ -161,15 +161,8 @@ class Prior:
         return sign * up_source, sign * up_target
 
 
-def _turn_to_z(up: Array | None) -> Array:
-    # The shortest rotation that brings `up` to z.
-    if up is None:
-        return np.eye(3)
-    axis, cosine = np.cross(up, _Z), float(up @ _Z)
-    sine = float(np.linalg.norm(axis))
-    if sine < 1e-12:
-        return np.eye(3) if cosine > 0.0 else np.diag([1.0, -1.0, -1.0])
-    return se3.rotation_about(axis / sine * np.arctan2(sine, cosine))
+def _levelling(up: Array | None) -> Array:
+    return se3.from_rt(np.eye(3) if up is None else se3.turn_to_z(up), np.zeros(3))
 
 
 def _gravity(value: Any) -> Any:

@@ -96,19 +96,21 @@ def as_pose(found: Sequence[Hypothesis]) -> Pose:
     return replace(pose, found_by=found[0].found_by, hypotheses=tuple(found))
 
 
+def as_hypotheses(pose: Pose) -> list[Hypothesis | Array]:
+    """A pose and its rivals: the hypotheses that they were made of, where nothing has moved them since, else (4, 4)."""
+    poses = [pose.T, *pose.rivals]
+    if len(pose.hypotheses) != len(poses):
+        return list(poses)
+    return [
+        one if isinstance(one, Hypothesis) and np.array_equal(one.T, T) else T
+        for one, T in zip(pose.hypotheses, poses, strict=True)
+    ]
+
+
 def of_pose(scene: Scene, pose: Pose) -> PoseEvidence:
-    """Evidence for a pose: that of the hypothesis it was made of, where nothing has moved it since."""
-    for one in pose.hypotheses[:1]:
-        if isinstance(one, Hypothesis) and np.array_equal(one.T, pose.T):
-            return one.at
-    return PoseEvidence(views.of(scene), pose.T)
-
-
-def rivals_of(pose: Pose) -> list[Hypothesis | Array]:
-    """The rivals of a pose: as hypotheses where it was made of such, else as (4, 4)."""
-    if len(pose.hypotheses) == 1 + len(pose.rivals):
-        return list(pose.hypotheses[1:])
-    return list(pose.rivals)
+    """Evidence for a pose: that of the hypothesis that it is, if it is one."""
+    own = as_hypotheses(pose)[0]
+    return own.at if isinstance(own, Hypothesis) else PoseEvidence(views.of(scene), own)
 
 
 def parted(poses: Sequence[Array | Hypothesis]) -> tuple[list[Hypothesis], list[Array]]:

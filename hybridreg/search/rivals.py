@@ -11,7 +11,7 @@ from hybridreg.evidence.pose_evidence import PoseEvidence
 from hybridreg.geometry import se3
 from hybridreg.matches import Pose
 from hybridreg.scene import Scene
-from hybridreg.search.hypothesis import Hypothesis, parted, rivals_of, seen_at
+from hybridreg.search.hypothesis import Hypothesis, as_hypotheses, parted, seen_at
 from hybridreg.search.ranking import best, differs
 from hybridreg.search.repeats import copies
 from hybridreg.search.settle import settle
@@ -38,7 +38,7 @@ def find(scene: Scene, own: PoseEvidence, pose: Pose) -> list[Hypothesis]:
     def with_matches(one: Hypothesis) -> Hypothesis:
         return one.but(matched=match_agreement.share(scene, one.T), closeness=0.0, found_by=1)
 
-    known, guesses = parted(rivals_of(pose)[:_OFFERED])
+    known, guesses = parted(as_hypotheses(pose)[1 : 1 + _OFFERED])
     guesses += [*_turned(own), *copies(views, own.T, own.agreement.axes)]
     promising = [*known, *seen_at(scene, [T for T in guesses if is_rival(T)], _QUICK)]
     found: list[Hypothesis] = []
