@@ -14,28 +14,24 @@ import argparse
 import json
 import time
 from collections.abc import Callable, Iterator
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Any, NamedTuple
 from unittest import mock
 
-import numpy as np
-from numpy.typing import NDArray
-
 from hybridreg import Pipeline
 from hybridreg.candidates import candidates
 from hybridreg.data import hard, open_dataset
-from hybridreg.geometry import se3
-from hybridreg.pair import Pair
+from hybridreg.data.hard.true_poses import Sample, is_right
+from hybridreg.pair import LabelledPair, Pair
 from hybridreg.search import rivals, settle
-
-Array = NDArray[np.float64]
-Row = dict[str, Any]
+from hybridreg.verdict.training.answers import Row, read
 
 TIERS = ("near", "mid", "far", "degenerate", "disjoint")
 # Hard pairs for each pair of a tier, and the first of their even seeds: below it they took part in fits.
 _HARD, _FIRST_SEED = 2, 300
-# Degrees and metres within which a pose is right.
-_RIGHT_DEG, _RIGHT_METRES = 2.0, 0.5
+# Metres within which a pose of simulated and real pairs is right.
+_RIGHT_METRES = 0.5
 
 _settle = settle.settle
 # What is put in the place of each move: module, name, replacement.
@@ -58,30 +54,35 @@ _OF_THE_FIRST = ("none", "settling", "settling from afar", "GICP")
 
 
 class Case(NamedTuple):
-    """A pair, every right pose (none where no pose is right), and the metres within which a pose is right."""
+    """A pair of a group, and which poses are right."""
 
-    name: str
     group: str
     pair: Pair
-    truths: tuple[Array, ...]
-    metres: float
+    sample: Sample
 
 
 def cases(n: int, real: Path) -> Iterator[Case]:
     """`n` pairs of each tier and their hard ones, in turn; then the real ones."""
     for i in range(n):
         for tier in TIERS:
-            labelled = open_dataset(f"sim:val/{tier}")[i]
-            truths = () if tier == "disjoint" else (labelled.T_target_source,)
-            yield Case(f"{tier}/{i}", tier, labelled.pair, truths, _RIGHT_METRES)
+            yield _labelled(tier, open_dataset(f"sim:val/{tier}")[i])
         for k in range(_HARD * i, _HARD * i + _HARD):
-            kind = hard.KINDS[k % len(hard.KINDS)]
-            one = hard.sample(kind, _FIRST_SEED + 2 * (k // len(hard.KINDS)))
-            pair = Pair.of(one.source, one.target, id=one.name)
-            yield Case(one.name, "hard", pair, tuple(one.truths), one.metres)
+            one = hard.sample(hard.KINDS[k % len(hard.KINDS)], _FIRST_SEED + 2 * (k // len(hard.KINDS)))
+            yield Case("hard", Pair.of(one.source, one.target, id=one.name), one)
     if real.is_dir():
         for labelled in open_dataset(str(real)):
-            yield Case(labelled.pair.id, "real", labelled.pair, (labelled.T_target_source,), _RIGHT_METRES)
+            yield _labelled("real", labelled)
+
+
+def _labelled(group: str, labelled: LabelledPair) -> Case:
+    pair = labelled.pair
+    source, target = (cloud.points + cloud.offset for cloud in (pair.source, pair.target))
+    truths = () if group == "disjoint" else (labelled.T_target_source,)
+    sample = Sample(
+        kind=group, name=pair.id, source=source, target=target, truths=truths, metres=_RIGHT_METRES,
+        solvable=bool(truths),
+    )  # fmt: skip
+    return Case(group, pair, sample)
 
 
 def measure(case: Case, without: str) -> Row:
@@ -89,24 +90,13 @@ def measure(case: Case, without: str) -> Row:
     pipeline = Pipeline.preset("default")
     switch = MOVES[without]
     start = time.process_time()
-    if switch is None:
+    with mock.patch.object(*switch) if switch else nullcontext():
         result = pipeline.run(case.pair)
-    else:
-        module, name, instead = switch
-        with mock.patch.object(module, name, instead):
-            result = pipeline.run(case.pair)
-    seconds = time.process_time() - start
-    middle = np.median(case.pair.source.points, axis=0)[None] + case.pair.source.offset
-    right = any(_is_right(result.transformation, truth, middle, case.metres) for truth in case.truths)
     return {
-        "pair": case.name, "group": case.group, "without": without, "seconds": seconds, "right": right,
-        "solvable": bool(case.truths), "verdict": result.verdict, "entries": len(result.entries),
+        "pair": case.pair.id, "group": case.group, "without": without, "seconds": time.process_time() - start,
+        "right": is_right(case.sample, result.transformation), "verdict": result.verdict,
+        "entries": len(result.entries),
     }  # fmt: skip
-
-
-def _is_right(T: Array, truth: Array, middle: Array, metres: float) -> bool:
-    gap = float(np.linalg.norm(se3.apply(T, middle) - se3.apply(truth, middle)))
-    return se3.angle_deg((T @ se3.inverse(truth))[:3, :3]) < _RIGHT_DEG and gap < metres
 
 
 def table(rows: list[Row]) -> str:
@@ -148,16 +138,16 @@ def main() -> None:
     parser.add_argument("--real", type=Path, default=Path("../shared/data/real"))
     parser.add_argument("--table", type=Path)
     options = parser.parse_args()
-    rows = (
-        [json.loads(line) for line in options.rows.read_text().splitlines()] if options.rows.exists() else []
-    )
+    rows = read(options.rows)
     held = {(row["pair"], row["without"]) for row in rows}
     options.rows.parent.mkdir(parents=True, exist_ok=True)
     with options.rows.open("a") as file:
         for case in cases(options.pairs, options.real):
-            easy = any(r["pair"] == case.name and r["without"] == "none" and r["entries"] == 1 for r in rows)
+            easy = any(
+                r["pair"] == case.pair.id and r["without"] == "none" and r["entries"] == 1 for r in rows
+            )
             for move in MOVES:
-                if (case.name, move) in held or (easy and move not in _OF_THE_FIRST):
+                if (case.pair.id, move) in held or (easy and move not in _OF_THE_FIRST):
                     continue
                 row = measure(case, move)
                 easy |= move == "none" and row["entries"] == 1
