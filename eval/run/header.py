@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from hybridreg.config.plain_values import value_of
+from hybridreg.io import line_file
 from hybridreg.io.structured import parse_json
 
 FORMAT = "hybridreg predictions 1"
@@ -40,10 +41,8 @@ def whole_lines(path: Path) -> tuple[list[str], int]:
     ValueError
         Not text.
     """
-    data = path.read_bytes()
-    end = data.rfind(b"\n") + 1
     try:
-        return data[:end].decode("utf-8").splitlines(), end
+        return line_file.whole_lines(path)
     except UnicodeDecodeError as error:
         raise ValueError(f"{path}: not a file of predictions ({error})") from error
 

@@ -13,10 +13,10 @@ from pathlib import Path
 from typing import Any
 
 from hybridreg.eval.run.header import FORMAT, header_of, refuse_foreign, whole_lines
-from hybridreg.eval.run.lines import LineFile
 from hybridreg.eval.run.row import Row
 from hybridreg.io.atomic import write_text
 from hybridreg.io.faults import naming
+from hybridreg.io.line_file import LineFile, cut
 from hybridreg.io.lock import file_lock
 
 _CURE = "add --overwrite to start over, or choose another --out"
@@ -148,8 +148,7 @@ class Appender:
         whole = whole_lines(self.path)[1] if self.path.exists() and not anew else 0
         if whole:
             # What follows the last complete line is a partial row of an interrupted run.
-            with naming(self.path):
-                os.truncate(self.path, whole)
+            cut(self.path, whole)
             return LineFile(self.path, anew=False)
         file = LineFile(self.path, anew=True)
         file.add(self._header)

@@ -10,9 +10,10 @@ from typing import Any, NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
-from hybridreg.io import ros_messages, tables
+from hybridreg.io import tables
 from hybridreg.io.arrays import TOGETHER, array_points
 from hybridreg.io.formats.las_units import in_metres
+from hybridreg.io.recorded import ros_messages
 
 Array = NDArray[np.float64]
 

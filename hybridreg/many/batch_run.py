@@ -8,6 +8,7 @@ import io
 import json
 import os
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import closing
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -18,6 +19,7 @@ from hybridreg import changes
 from hybridreg.cloud import PointCloud
 from hybridreg.io.atomic import write_text
 from hybridreg.io.csv_cells import cell
+from hybridreg.io.line_file import LineFile, cut, whole_lines
 from hybridreg.io.lock import folder_lock
 from hybridreg.many.jobs import Job
 from hybridreg.many.target import Target
@@ -89,15 +91,14 @@ def run(
     with folder_lock(folder):
         path = folder / _ROWS
         done = {} if overwrite else _read(path, settings)
-        if not done:
-            write_text(path, json.dumps(settings) + "\n")
         # One target after another, so that each is prepared once.
         left = sorted((job for job in jobs if _key(job) not in done), key=lambda job: job.target)
         work = ((job, json.dumps(settings)) for job in left)
-        with open(path, "a", encoding="utf-8") as file:
+        with closing(LineFile(path, anew=not done)) as file:
+            if not done:
+                file.add(json.dumps(settings))
             for row in spread(_one, work, workers, singly=True):
-                file.write(json.dumps(row) + "\n")
-                file.flush()
+                file.add(json.dumps(row))
                 done[(row["id"], row["source"], row["target"])] = row
                 on_row(row)
         rows = [done[_key(job)] for job in jobs]
@@ -112,12 +113,10 @@ def _key(job: Job) -> tuple[str, str, str]:
 def _read(path: Path, settings: Row) -> dict[tuple[str, str, str], Row]:
     if not path.is_file():
         return {}
-    # Whatever follows the last line's end was cut off by a crash.
-    whole, mark, _ = path.read_text(encoding="utf-8").rpartition("\n")
-    lines = whole.split("\n") if mark else []
-    if not lines:
-        return {}
     try:
+        lines, length = whole_lines(path)
+        if not lines:
+            return {}
         header, *rows = (json.loads(line) for line in lines)
         found = {(row["id"], row["source"], row["target"]): row for row in rows}
     except (ValueError, TypeError, KeyError) as error:
@@ -126,7 +125,7 @@ def _read(path: Path, settings: Row) -> dict[tuple[str, str, str], Row]:
         raise ValueError(
             f"{path}: was made with other settings; add --overwrite to make it anew, or choose another --out"
         )
-    write_text(path, "\n".join(lines) + "\n")
+    cut(path, length)
     return found
 
 

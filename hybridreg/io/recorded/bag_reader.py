@@ -11,9 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hybridreg.io import ros_messages
 from hybridreg.io.faults import fault, foreign_parser
-from hybridreg.io.recorded import livox_message
+from hybridreg.io.recorded import livox_message, ros_messages
 from hybridreg.io.recorded.recording import Recorded, Selection
 from hybridreg.runtime.optional_packages import load
 

@@ -51,3 +51,22 @@ class LineFile:
     def close(self) -> None:
         """Close the file."""
         os.close(self._handle)
+
+
+def whole_lines(path: Path) -> tuple[list[str], int]:
+    """The complete lines of a file, and their number of bytes: what follows was cut off by a crash.
+
+    Raises
+    ------
+    UnicodeDecodeError
+        Not text.
+    """
+    data = path.read_bytes()
+    end = data.rfind(b"\n") + 1
+    return data[:end].decode("utf-8").splitlines(), end
+
+
+def cut(path: Path, length: int) -> None:
+    """Cut a file behind its complete lines, `length` bytes."""
+    with naming(path):
+        os.truncate(path, length)
