@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import os
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -60,6 +61,14 @@ def save(figure: Figure, path: str | os.PathLike[str]) -> None:
         figure.savefig(
             temporary, format="pdf" if pdf else "png", metadata={"CreationDate": None} if pdf else None
         )
+
+
+def save_both(figure: Figure, folder: str | os.PathLike[str], name: str) -> list[Path]:
+    """Write `name.png` and `name.pdf`."""
+    files = [Path(folder) / f"{name}.{kind}" for kind in ("png", "pdf")]
+    for file in files:
+        save(figure, file)
+    return files
 
 
 def window(points: Array) -> tuple[Array, Array]:

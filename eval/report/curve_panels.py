@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Literal
 
-from hybridreg.eval.report.cloud_pictures import new_figure, save
+from hybridreg.eval.report.cloud_pictures import new_figure, save_both
 from hybridreg.eval.score import curves, errors
 from hybridreg.eval.score.protocols import Protocol
 from hybridreg.eval.scored_table import Entry
@@ -49,10 +49,9 @@ def write(folder: str | os.PathLike[str], entries: Sequence[Entry], protocol: Pr
         row[0].set_ylabel("recall, %")
     text = io.StringIO()
     csv.writer(text, lineterminator="\n").writerows([[cell(value) for value in line] for line in lines])
-    files = [Path(folder) / f"curves.{kind}" for kind in ("png", "pdf", "csv")]
-    save(figure, files[0])
-    save(figure, files[1])
-    write_text(files[2], text.getvalue())
+    table = Path(folder) / "curves.csv"
+    files = [*save_both(figure, folder, "curves"), table]
+    write_text(table, text.getvalue())
     return files
 
 

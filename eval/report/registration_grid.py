@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from hybridreg.data.dataset import ids_of
-from hybridreg.eval.report.cloud_pictures import draw_clouds, new_figure, save, thin, window
+from hybridreg.eval.report.cloud_pictures import draw_clouds, new_figure, save_both, thin, window
 from hybridreg.eval.report.figure_choice import row_of, wrapped
 from hybridreg.eval.run.row import Row
 from hybridreg.eval.score import errors
@@ -65,10 +65,7 @@ def write(
         axes.set_title(title, fontsize=9)
     handles, labels = grid[0][0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower left", ncols=2, markerscale=8, fontsize=9)
-    files = [Path(folder) / f"registrations.{kind}" for kind in ("png", "pdf")]
-    for file in files:
-        save(figure, file)
-    return files
+    return save_both(figure, folder, "registrations")
 
 
 def _judge(axes: Any, row: Row | None, protocol: Protocol) -> None:

@@ -6,9 +6,10 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hybridreg.config.plain_values import value_of
 from hybridreg.data.dataset import ids_of
@@ -51,7 +52,7 @@ def redraw(
             continue
         folder = Path(out) / slug(entry.name)
         for name in [row.id for row in entry.rows if row.error is None and row.id in ids][:n]:
-            written += _draw(control, pairs[ids.index(name)], table.seed, protocol, folder)
+            written += _draw(rerun(entry.name, control, pairs[ids.index(name)], table.seed), protocol, folder)
     return written
 
 
@@ -75,20 +76,32 @@ def control_of(entry: Entry) -> Control | None:
     return Control(pipeline=pipeline, **told)
 
 
-def _draw(
-    control: Control, labelled: LabelledPair, seed: int, protocol: Protocol, folder: Path
-) -> list[Path]:
+class Rerun(NamedTuple):
+    """A method on a pair once more: its trace, the true pose (4, 4), and where its matcher cuts the mask."""
+
+    method: str
+    pair: str
+    trace: Trace
+    truth: NDArray[np.float64]
+    threshold: float
+
+
+def rerun(method: str, control: Control, labelled: LabelledPair, seed: int) -> Rerun:
+    """Run a method on a pair once more."""
     pipeline, pair = control.told(labelled)
-    trace = pipeline.trace(pair, seed=seed)
     truth = lower_pose(labelled.T_target_source, pair)
+    return Rerun(method, pair.id, pipeline.trace(pair, seed=seed), truth, mask_threshold(pipeline.match))
+
+
+def _draw(one: Rerun, protocol: Protocol, folder: Path) -> list[Path]:
     folder.mkdir(parents=True, exist_ok=True)
     written = []
-    if len(trace.matches):
-        written.append(folder / f"{slug(pair.id)}-matches.png")
-        stage_pictures.matches(written[-1], trace, truth, protocol.inlier_m)
-    if not keeps_all(trace):
-        written.append(folder / f"{slug(pair.id)}-mask.png")
-        stage_pictures.mask(written[-1], trace, truth, mask_threshold(pipeline.match))
+    if len(one.trace.matches):
+        written.append(folder / f"{slug(one.pair)}-matches.png")
+        stage_pictures.matches(written[-1], one.trace, one.truth, protocol.inlier_m)
+    if not keeps_all(one.trace):
+        written.append(folder / f"{slug(one.pair)}-mask.png")
+        stage_pictures.mask(written[-1], one.trace, one.truth, one.threshold)
     return written
 
 

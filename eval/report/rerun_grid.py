@@ -6,32 +6,15 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import NamedTuple
-
-import numpy as np
-from numpy.typing import NDArray
 
 from hybridreg.data.dataset import ids_of
 from hybridreg.eval.report import stage_pictures
-from hybridreg.eval.report.cloud_pictures import new_figure, save
+from hybridreg.eval.report.cloud_pictures import new_figure, save_both
 from hybridreg.eval.report.figure_choice import wrapped
-from hybridreg.eval.report.rerun_for_pictures import control_of, keeps_all
-from hybridreg.eval.run.truth import mask_threshold
+from hybridreg.eval.report.rerun_for_pictures import Rerun, control_of, keeps_all, rerun
 from hybridreg.eval.score.protocols import Protocol
 from hybridreg.eval.scored_table import Entry
-from hybridreg.frames import lower_pose
 from hybridreg.pair import LabelledPair
-from hybridreg.pipeline import Trace
-
-
-class Rerun(NamedTuple):
-    """A method on a pair once more: its trace, the true pose (4, 4), and where its matcher cuts the mask."""
-
-    method: str
-    pair: str
-    trace: Trace
-    truth: NDArray[np.float64]
-    threshold: float
 
 
 def write_matches(
@@ -65,7 +48,7 @@ def write_matches(
         share = stage_pictures.draw_matches(axes, one.trace, one.truth, protocol.inlier_m)
         axes.set(xticks=[], yticks=[], xlabel=f"{100 * share:.1f} % right within {protocol.inlier_m:g} m")
         axes.set_title(f"{wrapped(one.method, 60)}\n{one.pair}", fontsize=9, pad=16)
-    return _saved(figure, folder, "matches")
+    return save_both(figure, folder, "matches")
 
 
 def write_masks(
@@ -93,7 +76,7 @@ def write_masks(
         panels[0].set_ylabel(f"{wrapped(one.method, 40)}\n{one.pair}")
     handles, labels = grid[0][0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower left", ncols=4, markerscale=6)
-    return _saved(figure, folder, "masks")
+    return save_both(figure, folder, "masks")
 
 
 def _rerun(
@@ -105,15 +88,4 @@ def _rerun(
         if control is None:
             continue
         for name in names:
-            labelled = pairs[ids.index(name)]
-            pipeline, pair = control.told(labelled)
-            truth = lower_pose(labelled.T_target_source, pair)
-            trace = pipeline.trace(pair, seed=seed)
-            yield Rerun(entry.name, name, trace, truth, mask_threshold(pipeline.match))
-
-
-def _saved(figure: object, folder: str | os.PathLike[str], name: str) -> list[Path]:
-    files = [Path(folder) / f"{name}.{kind}" for kind in ("png", "pdf")]
-    for file in files:
-        save(figure, file)  # type: ignore[arg-type]
-    return files
+            yield rerun(entry.name, control, pairs[ids.index(name)], seed)._replace(pair=name)

@@ -89,14 +89,10 @@ def _from_sphere(distance: Array, azimuth: Array, elevation: Array) -> Array:
 
 
 def _rotation(quaternion: Array, name: str) -> Array:
+    from scipy.spatial.transform import Rotation
+
     length = float(np.linalg.norm(quaternion))
     if not 0.5 < length < 2.0:
         raise fault(name, f"a scan's rotation is the quaternion {quaternion.tolist()}, no rotation")
-    w, x, y, z = quaternion / length
-    return np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-        ]
-    )
+    rotation: Array = Rotation.from_quat(np.roll(quaternion, -1)).as_matrix()  # w stands last there
+    return rotation

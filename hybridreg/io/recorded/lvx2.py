@@ -64,6 +64,8 @@ def read_lvx2(path: Path, selection: Selection) -> Recorded:
 
 
 def _device(data: bytes, place: int, name: str) -> tuple[int, tuple[Array, Array]]:
+    from scipy.spatial.transform import Rotation
+
     if place + _DEVICE > len(data):
         raise fault(name, "breaks off among its devices")
     lidar = struct.unpack_from("<I", data, place + 32)[0]
@@ -71,15 +73,8 @@ def _device(data: bytes, place: int, name: str) -> tuple[int, tuple[Array, Array
     roll, pitch, yaw, x, y, z = struct.unpack_from("<6f", data, place + 39)
     if not counts:
         return lidar, (np.eye(3), np.zeros(3))
-    return lidar, (_turn(2, yaw) @ _turn(1, pitch) @ _turn(0, roll), np.array([x, y, z], dtype=np.float64))
-
-
-def _turn(axis: int, degrees: float) -> Array:
-    c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
-    a, b = [(1, 2), (2, 0), (0, 1)][axis]
-    R = np.eye(3)
-    R[a, a], R[a, b], R[b, a], R[b, b] = c, -s, s, c
-    return R
+    rotation = Rotation.from_euler("xyz", [roll, pitch, yaw], degrees=True).as_matrix()
+    return lidar, (rotation, np.array([x, y, z], dtype=np.float64))
 
 
 def _frames(data: bytes, place: int, name: str) -> Any:
