@@ -54,15 +54,13 @@ class Cofinet(StackedStage):
             raise ValueError(f"seed={self.seed} must not be negative")
 
     def __call__(self, scene: Scene, overlap: Overlap) -> Correspondences:
-        import torch
 
         from hybridreg.learned.stages.drawing import draw
         from hybridreg.learned.stages.tensor_values import array
 
-        self.note_random(scene)
         network: CofinetNetwork = self.network()
-        encoding = scene.shared(("encoding", self.network_name()), lambda: self._encode(scene))
-        with torch.inference_mode():
+        encoding = self.once(scene, lambda: self._encode(scene))
+        with self.inference():
             found = network.match_points(encoding, self._nodes(scene, overlap, encoding))
         rows = draw(array(found.weight), self.matches, self.seed)
         return Correspondences(
@@ -74,9 +72,7 @@ class Cofinet(StackedStage):
         )
 
     def _encode(self, scene: Scene) -> CofinetEncoding:
-        import torch
-
-        with torch.inference_mode():
+        with self.inference():
             return self.network().encode(self.batch(scene))
 
     def _nodes(self, scene: Scene, overlap: Overlap, encoding: CofinetEncoding) -> NodePairs:

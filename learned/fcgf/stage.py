@@ -51,7 +51,6 @@ class Fcgf(NetworkStage):
             raise ValueError(f"min_overlap={self.min_overlap} must lie in [0, 1]")
 
     def __call__(self, scene: Scene, overlap: Overlap) -> Correspondences:
-        import torch
 
         from hybridreg.learned.fcgf.batch import make_batch
         from hybridreg.learned.memory_estimate import require_bytes
@@ -63,11 +62,11 @@ class Fcgf(NetworkStage):
         self.note_random(scene)
         note_grid(scene, voxel)
         clouds = (scene.pair.target.points, scene.pair.source.points)
-        batch = make_batch(*clouds, network.config, device=self.device)
-        lengths = (len(batch.target.points), len(batch.source.points))
         cure = f"use weights with a voxel larger than {voxel:g} m, or crop the clouds"
-        require_bytes(network.memory(batch), lengths, self.device, cure)
-        with torch.inference_mode():
+        with self.inference():
+            batch = make_batch(*clouds, network.config, device=self.device)
+            lengths = (len(batch.target.points), len(batch.source.points))
+            require_bytes(network.memory(batch), lengths, self.device, cure)
             found = network(batch)
         source = DensePoints(points=array(batch.source.points), features=array(found.source))
         target = DensePoints(points=array(batch.target.points), features=array(found.target))

@@ -44,7 +44,6 @@ class OmNet(NetworkStage):
             raise ValueError(f"points={self.points} must be at least 1")
 
     def __call__(self, scene: Scene, matches: Correspondences, rng: np.random.Generator) -> Pose:
-        import torch
 
         from hybridreg.learned.memory_estimate import require_bytes
         from hybridreg.learned.omnet.batch import make_batch
@@ -65,7 +64,7 @@ class OmNet(NetworkStage):
             device=self.device,
         )
         require_bytes(network.memory(batch), (points, points), self.device, "use fewer with points=...")
-        with torch.inference_mode():
+        with self.inference():
             found = array(network(batch).transform)[0]
         if not np.isfinite(found).all():
             scene.note("OMNet gave no finite pose")

@@ -28,13 +28,10 @@ class _PredatorStage(StackedStage):
 
     def output(self, scene: Scene) -> PredatorOutput:
         """The network's output for a pair: computed once a run for all stages of the same network."""
-        self.note_random(scene)
-        return scene.shared(("output", self.network_name()), lambda: self._run(scene))
+        return self.once(scene, lambda: self._run(scene))
 
     def _run(self, scene: Scene) -> PredatorOutput:
-        import torch
-
-        with torch.inference_mode():
+        with self.inference():
             output: PredatorOutput = self.network()(self.batch(scene))
         return output
 

@@ -51,7 +51,6 @@ class Roitr(NetworkStage):
             raise ValueError(f"min_overlap={self.min_overlap} must lie in [0, 1]")
 
     def __call__(self, scene: Scene, overlap: Overlap) -> Correspondences:
-        import torch
 
         from hybridreg.learned.memory_estimate import require_bytes
         from hybridreg.learned.roitr.batch import make_batch
@@ -65,10 +64,10 @@ class Roitr(NetworkStage):
             for name, points in zip(("target", "source"), on_grid(scene, config.voxel), strict=True)
         ]
         viewpoints = (scene.target.viewpoint, scene.source.viewpoint)
-        batch = make_batch(clouds[0], clouds[1], config, viewpoints=viewpoints, device=self.device)
         cure = f"use weights with a voxel larger than {config.voxel:g} m, or crop the clouds"
-        require_bytes(network.memory(batch), (len(clouds[0]), len(clouds[1])), self.device, cure)
-        with torch.inference_mode():
+        with self.inference():
+            batch = make_batch(clouds[0], clouds[1], config, viewpoints=viewpoints, device=self.device)
+            require_bytes(network.memory(batch), (len(clouds[0]), len(clouds[1])), self.device, cure)
             target, source = network.encode(batch)
             kept = (
                 self._kept(overlap.target, scene.target, target),

@@ -5,15 +5,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-import torch
-
 from hybridreg.learned.cross3dreg.batch import Batch, make_batch
 from hybridreg.learned.cross3dreg.encodings import Encoding
 from hybridreg.learned.memory_estimate import require_memory
 from hybridreg.learned.stages.levelling import Turns, likeness
 from hybridreg.learned.stages.network_grid import note_grid
 from hybridreg.learned.stages.network_stage import NetworkStage
-from hybridreg.runtime.threads import single
 from hybridreg.scene import Scene
 
 if TYPE_CHECKING:
@@ -22,8 +19,7 @@ if TYPE_CHECKING:
 
 def encode(scene: Scene, stage: NetworkStage) -> Encoding:
     """The pair after the encoders of a stage's network."""
-    stage.note_random(scene)
-    return scene.shared(("encoding", stage.network_name()), lambda: _encode(scene, stage))
+    return stage.once(scene, lambda: _encode(scene, stage))
 
 
 def _encode(scene: Scene, stage: NetworkStage) -> Encoding:
@@ -34,7 +30,7 @@ def _encode(scene: Scene, stage: NetworkStage) -> Encoding:
     # Cylindrical kernel points take z as the vertical, and sensors may be mounted in any orientation. The ground shows
     # it, unless a wall was taken for the ground: both are tried.
     upright = Turns.upright(scene) if network.config.backbone.kernel == "cylindrical" else None
-    with single(), torch.inference_mode():
+    with stage.inference():
         as_given = _encode_turned(scene, stage, Turns.none())
         if upright is None:
             return as_given

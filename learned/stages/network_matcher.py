@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, ClassVar, Literal
 
 from hybridreg.learned.stages.network_stage import NetworkStage
 from hybridreg.matches import Correspondences, Overlap
-from hybridreg.runtime.threads import single
 from hybridreg.scene import Scene
 
 if TYPE_CHECKING:
@@ -83,14 +82,13 @@ class NetworkMatcher(NetworkStage):
         return replace(self, filtered=False) if self.filtered and active else None
 
     def __call__(self, scene: Scene, overlap: Overlap) -> Correspondences:
-        import torch
 
         from hybridreg.learned.stages.encoding import encode
         from hybridreg.learned.stages.kept_superpoints import keep
 
         network = self.configured()
         encoding = encode(scene, self)
-        with single(), torch.inference_mode():
+        with self.inference():
             kept = keep(scene, overlap, encoding, network.config, self.min_overlap)
             features = network.attend(encoding, kept)
             _, matches = network.match(encoding, kept, features, filtered=self.filtered)

@@ -4,9 +4,12 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
 
+from hybridreg.runtime.threads import single
 from hybridreg.stage import Stage
 
 if TYPE_CHECKING:
@@ -14,6 +17,8 @@ if TYPE_CHECKING:
 
     from hybridreg.learned.stages.networks import Loaded, NetworkName
     from hybridreg.scene import Scene
+
+Value = TypeVar("Value")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -122,6 +127,20 @@ class NetworkStage(Stage):
         from hybridreg.learned.stages.networks import load
 
         return load(self.network_name())
+
+    @staticmethod
+    @contextmanager
+    def inference() -> Iterator[None]:
+        """Without gradients and in one thread (`hybridreg.runtime.threads`): for all that a network does."""
+        import torch
+
+        with single(), torch.inference_mode():
+            yield
+
+    def once(self, scene: Scene, run: Callable[[], Value]) -> Value:
+        """What the network makes of a pair: `run()`, once a run for all stages of the same network."""
+        self.note_random(scene)
+        return scene.shared(self.network_name(), run)
 
     def network_name(self) -> NetworkName:
         """Identity of this stage's network; stages with equal names share one encoding of a pair."""

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, ClassVar
 
 from hybridreg.learned.stages.network_stage import NetworkStage
 from hybridreg.matches import Overlap
-from hybridreg.runtime.threads import single
 from hybridreg.scene import Scene
 
 if TYPE_CHECKING:
@@ -51,7 +50,7 @@ class Omp(NetworkStage):
                 f"the mask is not as published: OMP of {self.weights!r} was trained to look at {' and '.join(ours)} "
                 "too; `hybridreg train paper` trains one that does not"
             )
-        with single(), torch.inference_mode():
+        with self.inference():
             logits = network.predict_overlap(encoding)
             assert logits is not None, "check() lets no network without OMP through"
             if not logits.informed:

@@ -89,11 +89,11 @@ class Vrhcf(NetworkStage):
         # Axes face the origin: with the sensor there, they face the sensor.
         seen_from = [place(level, config.facing) for _, level in levels]
         moved = [points - at for points, at in zip(clouds, seen_from, strict=True)]
-        batch = make_batch(moved[0], moved[1], config, keypoints=(rows[0], rows[1]), device=self.device)
         described = (len(rows[0]), len(rows[1]))
-        require_bytes(network.memory(batch), described, self.device, "set max_keypoints to less")
         matching = self.matching or config.matching
-        with torch.inference_mode():
+        with self.inference():
+            batch = make_batch(moved[0], moved[1], config, keypoints=(rows[0], rows[1]), device=self.device)
+            require_bytes(network.memory(batch), described, self.device, "set max_keypoints to less")
             output = network(batch)
             partner = match_descriptors(output.source, output.target, matching)
             use = torch.ones_like(partner, dtype=torch.bool)
