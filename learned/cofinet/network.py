@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import os
 from dataclasses import dataclass
+from functools import partial
 from typing import ClassVar
 
 import torch
@@ -13,16 +14,16 @@ from torch.nn import functional as F
 
 from hybridreg.learned.checkpoints import read_checkpoint
 from hybridreg.learned.cofinet.config import SIZES, CofinetConfig, named_config
-from hybridreg.learned.cofinet.examples import example
 from hybridreg.learned.cofinet.losses import CofinetLosses, cofinet_losses
 from hybridreg.learned.cofinet.official_names import UNUSED, official_name
 from hybridreg.learned.cofinet.patching import PatchIndex, patch_index
 from hybridreg.learned.cofinet.point_transport import MASKED, alternating_sinkhorn, either_best
 from hybridreg.learned.cofinet.selection import NodePairs, Tried, select
-from hybridreg.learned.cofinet.targets import CofinetTargets
+from hybridreg.learned.cofinet.targets import CofinetTargets, compute_targets
 from hybridreg.learned.cofinet.transformer import PairTransformer, scores
 from hybridreg.learned.cross3dreg.batch import Batch
 from hybridreg.learned.kpfcnn.kpfcnn import KpfcnnDecoder, KpfcnnEncoder
+from hybridreg.learned.kpfcnn.stacked_examples import stacked_example
 from hybridreg.learned.kpfcnn.stacked_memory import encoder_bytes
 from hybridreg.learned.layers.message_attention import Clouds, Masks
 from hybridreg.learned.matching.point_matching import PointMatches
@@ -85,7 +86,7 @@ class CofinetNetwork(Pretrained):
     sizes: ClassVar[tuple[str, ...]] = tuple(SIZES)
     loss_names: ClassVar[tuple[str, ...]] = ("coarse", "fine")
     named_config = staticmethod(named_config)
-    example = staticmethod(example)
+    example = staticmethod(partial(stacked_example, compute_targets=compute_targets))
 
     def __init__(self, config: CofinetConfig, seed: int = 0) -> None:
         super().__init__()

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import os
 from dataclasses import dataclass
+from functools import partial
 from typing import ClassVar
 
 import torch
@@ -14,13 +15,13 @@ from torch.nn import functional as F
 from hybridreg.learned.checkpoints import read_checkpoint
 from hybridreg.learned.cross3dreg.batch import Batch
 from hybridreg.learned.kpfcnn.kpfcnn import KpfcnnDecoder, KpfcnnEncoder
+from hybridreg.learned.kpfcnn.stacked_examples import stacked_example
 from hybridreg.learned.kpfcnn.stacked_memory import encoder_bytes
 from hybridreg.learned.predator.config import SIZES, PredatorConfig, named_config
-from hybridreg.learned.predator.examples import example
 from hybridreg.learned.predator.graph import GraphNetwork
 from hybridreg.learned.predator.losses import PredatorLosses, predator_losses
 from hybridreg.learned.predator.official_names import config_name, official_name
-from hybridreg.learned.predator.targets import PredatorTargets
+from hybridreg.learned.predator.targets import PredatorTargets, compute_targets
 from hybridreg.learned.pretrained import Pretrained
 from hybridreg.learned.pyramid.point_pyramid import Pyramid
 from hybridreg.learned.weights import load_official_tensors
@@ -70,7 +71,7 @@ class PredatorNetwork(Pretrained):
     sizes: ClassVar[tuple[str, ...]] = tuple(SIZES)
     loss_names: ClassVar[tuple[str, ...]] = ("circle", "overlap", "saliency")
     named_config = staticmethod(named_config)
-    example = staticmethod(example)
+    example = staticmethod(partial(stacked_example, compute_targets=compute_targets))
 
     def __init__(self, config: PredatorConfig, seed: int = 0) -> None:
         super().__init__()
