@@ -34,6 +34,9 @@ Entry = Mapping[str, Any]
 _SLOTS = ("overlap", "match", "estimate")
 # Confidence from which the user is believed to have made no mistake: by hand.
 _SURE = 0.99
+# Entries after which no other is run where all that was found is hopeless: of 200 pairs (`sim:val`, `sim:train`, hard
+# kinds) none was solved by a later one.
+_SUFFICE = 2
 # Poses of each entry that are looked at, its own and the best of its rivals: by hand.
 _LOOKED_AT = 8
 # How many of these are refined at most: by hand.
@@ -61,8 +64,8 @@ class Candidates(Stage):
     Every pose that an entry offers is settled and ranked by its log-odds (`hybridreg.evidence.log_odds`), the best are
     refined, and the best of these is weighed with the others as its rivals. A pose that several entries found is more
     credible; one that the surfaces hardly constrain is moved to where it is likelier. Later entries are not run once
-    the confidence is `enough`. Where none brings it, all starts are examined a second time, and likelier poses are
-    looked for around the best. What was not chosen is returned as `rivals`, what each entry did as `entries`.
+    the confidence is `enough`, nor after two that found nothing but hopeless poses: such clouds show different places.
+    Where no entry brings it, all starts are examined a second time, and likelier poses are looked for around the best. What was not chosen is returned as `rivals`, what each entry did as `entries`.
 
     Parameters
     ----------
@@ -142,7 +145,9 @@ class Candidates(Stage):
         missing: list[str] = []
         # A generator each, so that an entry's answer does not hang on those before it.
         *generators, last = rng.spawn(len(self.of) + 1)
-        for entry, own in zip(self.of, generators, strict=True):
+        for tried, (entry, own) in enumerate(zip(self.of, generators, strict=True)):
+            if tried >= _SUFFICE and found and found[0].log_odds < HOPELESS:
+                return
             name, start = _name(entry), time.perf_counter()
             here: list[Hypothesis] = []
             problem = None
