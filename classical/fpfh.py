@@ -110,8 +110,8 @@ class Fpfh(Stage):
         level = scene.level(side)
         radius = self.radius or _RADIUS * scene.spacing
         normals = level.normals(self.normal_neighbours)
-        key = ("fpfh", side, radius, self.max_neighbours, self.normal_neighbours)
-        return scene.shared(key, lambda: _fpfh(level.points, normals, radius, self.max_neighbours))
+        key = ("fpfh", radius, self.max_neighbours, self.normal_neighbours)
+        return level.once(key, lambda: _fpfh(level.points, normals, radius, self.max_neighbours))
 
     def _rows(self, scene: Scene, side: Side, features: Array, probability: Array) -> Indices:
         # A descriptor of zeros belongs to a point without neighbours, and equals all others like it.

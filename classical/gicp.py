@@ -69,9 +69,9 @@ class Gicp(Stage):
         if len(near) < _FEWEST_NEIGHBOURS:
             return pose
         source, _ = _surfaces(near, self.neighbours)
-        target, target_tree = scene.shared(
-            ("small_gicp", voxel, self.neighbours),
-            lambda: _surfaces(scene.at(voxel).target.points, self.neighbours),
+        level = scene.at(voxel).target
+        target, target_tree = level.once(
+            ("small_gicp", self.neighbours), lambda: _surfaces(level.points, self.neighbours)
         )
         rests = False
         for distance in distances:

@@ -44,7 +44,7 @@ class Level:
     points: Array
     spacing: float
     viewpoint: Array | None = None
-    _normals: dict[int, Array] = field(default_factory=dict, repr=False)
+    _kept: dict[Hashable, Any] = field(default_factory=dict, repr=False)
 
     @classmethod
     def on_cells(cls, cloud: PointCloud, voxel: float) -> Level:
@@ -56,7 +56,7 @@ class Level:
 
     def __getstate__(self) -> dict[str, Any]:
         # What is found out again in no time need not travel between processes.
-        return {name: self.__dict__[name] for name in ("points", "spacing", "viewpoint")} | {"_normals": {}}
+        return {name: self.__dict__[name] for name in ("points", "spacing", "viewpoint")} | {"_kept": {}}
 
     @cached_property
     def tree(self) -> cKDTree:
@@ -75,9 +75,14 @@ class Level:
 
     def normals(self, k: int = 20) -> Array:
         """Normals (n, 3) from each point's k nearest neighbours, towards the sensor."""
-        if k not in self._normals:
-            self._normals[k] = normals.estimate(self.points, self.viewpoint, k)
-        return self._normals[k]
+        return self.once(("normals", k), lambda: normals.estimate(self.points, self.viewpoint, k))
+
+    def once(self, key: Hashable, make: Callable[[], Value]) -> Value:
+        """Return `make()`, computed once for each key (normals, descriptors): of a prepared target, once for all."""
+        if key not in self._kept:
+            self._kept[key] = make()
+        value: Value = self._kept[key]
+        return value
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -134,7 +139,7 @@ class Scene:
         return max(self.source.spacing, self.target.spacing)
 
     def shared(self, key: Hashable, make: Callable[[], Value]) -> Value:
-        """Return `make()`, computed once a run for each key (normals, features, a network's encoding)."""
+        """Return `make()`, computed once a run for each key: what both clouds give together."""
         if key not in self._shared:
             self._shared[key] = make()
         value: Value = self._shared[key]

@@ -65,7 +65,8 @@ class Candidates(Stage):
     refined, and the best of these is weighed with the others as its rivals. A pose that several entries found is more
     credible; one that the surfaces hardly constrain is moved to where it is likelier. Later entries are not run once
     the confidence is `enough`, nor after two that found nothing but hopeless poses: such clouds show different places.
-    Where no entry brings it, all starts are examined a second time, and likelier poses are looked for around the best. What was not chosen is returned as `rivals`, what each entry did as `entries`.
+    Where no entry brings it, all starts are examined a second time, and likelier poses are looked for around the
+    best. What was not chosen is returned as `rivals`, what each entry did as `entries`.
 
     Parameters
     ----------
