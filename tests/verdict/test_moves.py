@@ -5,6 +5,10 @@ from __future__ import annotations
 
 from typing import Any
 
+import pytest
+
+from hybridreg import Pipeline
+from hybridreg.verdict.training import moves
 from hybridreg.verdict.training.moves import MOVES, table
 
 
@@ -12,10 +16,16 @@ def row(pair: str, without: str, right: bool, verdict: str, seconds: float) -> d
     return {"pair": pair, "without": without, "right": right, "verdict": verdict, "seconds": seconds}
 
 
-def test_each_move_names_something_that_can_be_switched_off() -> None:
-    switches = [switch for switch in MOVES.values() if switch is not None]
-    assert len(switches) == len(MOVES) - 1
-    assert all(callable(getattr(module, name)) for module, name, _ in switches)
+@pytest.mark.parametrize("without", [move for move in MOVES if move not in moves.ENTRIES and move != "none"])
+def test_each_move_names_something_that_can_be_switched_off(without: str) -> None:
+    owner, name, replacement = moves.PATCHES[without]
+    assert type(getattr(owner, name)) is type(replacement)
+
+
+@pytest.mark.parametrize("entry", moves.ENTRIES.values())
+def test_each_entry_can_bewithout_entry(entry: str) -> None:
+    whole = Pipeline.preset("default")
+    assert len(moves.without_entry(whole, entry).estimate.of) == len(whole.estimate.of) - 1
 
 
 def test_a_move_is_held_against_the_same_pairs_with_it() -> None:

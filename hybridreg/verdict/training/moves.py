@@ -4,8 +4,8 @@
     python -m hybridreg.verdict.training.moves --pairs 20 --rows runs/moves.jsonl --table runs/moves.md
 
 Tiers of `sim:val`, the hard kinds with even seeds, and real pairs where they lie beside the checkout; no test pair.
-Rows are appended as they are made, so that an interrupted run goes on. Seconds are processor seconds. Where the first
-entry is certain, only the moves that it makes are switched off.
+The rows of a pair are appended together, so that an interrupted run goes on. Seconds are processor seconds. Where the
+first entry is certain, only the moves that it makes are switched off.
 """
 
 from __future__ import annotations
@@ -13,14 +13,16 @@ from __future__ import annotations
 import argparse
 import json
 import time
-from collections.abc import Callable, Iterator
+from concurrent.futures import ProcessPoolExecutor
 from contextlib import nullcontext
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 from unittest import mock
 
-from hybridreg import Pipeline
+from hybridreg import Pipeline, registry
 from hybridreg.candidates import candidates
+from hybridreg.classical.overhead import birdseye
 from hybridreg.data import hard, open_dataset
 from hybridreg.data.hard.true_poses import Sample, is_right
 from hybridreg.pair import LabelledPair, Pair
@@ -34,9 +36,10 @@ _HARD, _FIRST_SEED = 2, 300
 _RIGHT_METRES = 0.5
 
 _settle = settle.settle
-# What is put in the place of each move: module, name, replacement.
-MOVES: dict[str, tuple[Any, str, Callable[..., Any]] | None] = {
-    "none": None,
+# The entries of `default` by what else a user would call them: left out one at a time.
+ENTRIES = {"KISS-Matcher": "kiss", "relief": "relief", "learned entry": "ransac"}
+# What is put in the place of each other move: module or class, name, replacement.
+PATCHES: dict[str, tuple[Any, str, Any]] = {
     "settling": (settle, "settle", lambda views, T, **how: T),
     "settling from afar": (
         settle,
@@ -44,13 +47,24 @@ MOVES: dict[str, tuple[Any, str, Callable[..., Any]] | None] = {
         lambda views, T, **how: _settle(views, T, **{**how, "wide": False}),
     ),
     "GICP": (candidates.Candidates, "_refined", lambda self, scene, one: one),
+    "second spectrum": (birdseye, "_LEVELLED", birdseye._LEVELLED[:1]),
+    "sliding along a street": (birdseye.BirdsEye, "_slid", lambda self, source, target, voxel: []),
+    "bird's-eye by sensors": (birdseye, "_leans", lambda own: False),
+    "stop where hopeless": (candidates, "_SUFFICE", len(TIERS) * len(ENTRIES)),
     "pattern search": (candidates, "_polished", lambda scene, found: found),
     "basin hopping": (candidates, "hop", lambda scene, poses, rng: []),
     "second look": (candidates, "second_look", lambda scene: []),
     "repeats as rivals": (rivals, "copies", lambda views, T, axes: []),
     "half turns as rivals": (rivals, "_turned", lambda own: []),
 }
-_OF_THE_FIRST = ("none", "settling", "settling from afar", "GICP")
+NONE = "none"
+MOVES = (NONE, *PATCHES, *ENTRIES)
+# Those that a pair is spared which the first entry answers beyond doubt.
+_OF_LATER = ("stop where hopeless", "pattern search", "basin hopping", "second look", *ENTRIES)
+
+
+# A group, or the folder of real pairs, and which of its pairs.
+Job = tuple[str, int]
 
 
 class Case(NamedTuple):
@@ -61,17 +75,25 @@ class Case(NamedTuple):
     sample: Sample
 
 
-def cases(n: int, real: Path) -> Iterator[Case]:
+def jobs(n: int, real: Path) -> list[Job]:
     """`n` pairs of each tier and their hard ones, in turn; then the real ones."""
-    for i in range(n):
-        for tier in TIERS:
-            yield _labelled(tier, open_dataset(f"sim:val/{tier}")[i])
-        for k in range(_HARD * i, _HARD * i + _HARD):
-            one = hard.sample(hard.KINDS[k % len(hard.KINDS)], _FIRST_SEED + 2 * (k // len(hard.KINDS)))
-            yield Case("hard", Pair.of(one.source, one.target, id=one.name), one)
-    if real.is_dir():
-        for labelled in open_dataset(str(real)):
-            yield _labelled("real", labelled)
+    some = [
+        job
+        for i in range(n)
+        for job in [*((tier, i) for tier in TIERS), *(("hard", _HARD * i + k) for k in range(_HARD))]
+    ]
+    return some + [(str(real), i) for i in range(len(open_dataset(str(real))) if real.is_dir() else 0)]
+
+
+def case(job: Job) -> Case:
+    """The pair of a job."""
+    group, i = job
+    if group == "hard":
+        one = hard.sample(hard.KINDS[i % len(hard.KINDS)], _FIRST_SEED + 2 * (i // len(hard.KINDS)))
+        return Case(group, Pair.of(one.source, one.target, id=one.name), one)
+    if group in TIERS:
+        return _labelled(group, open_dataset(f"sim:val/{group}")[i])
+    return _labelled("real", open_dataset(group)[i])
 
 
 def _labelled(group: str, labelled: LabelledPair) -> Case:
@@ -88,15 +110,35 @@ def _labelled(group: str, labelled: LabelledPair) -> Case:
 def measure(case: Case, without: str) -> Row:
     """One run without a move."""
     pipeline = Pipeline.preset("default")
-    switch = MOVES[without]
+    if without in ENTRIES:
+        pipeline = without_entry(pipeline, ENTRIES[without])
     start = time.process_time()
-    with mock.patch.object(*switch) if switch else nullcontext():
+    with mock.patch.object(*PATCHES[without]) if without in PATCHES else nullcontext():
         result = pipeline.run(case.pair)
     return {
         "pair": case.pair.id, "group": case.group, "without": without, "seconds": time.process_time() - start,
         "right": is_right(case.sample, result.transformation), "verdict": result.verdict,
         "entries": len(result.entries),
     }  # fmt: skip
+
+
+def without_entry(pipeline: Pipeline, estimate: str) -> Pipeline:
+    several = pipeline.estimate
+    others = tuple(
+        entry for entry in several.of if not registry.name_of(entry["estimate"]).endswith(estimate)
+    )
+    assert len(others) == len(several.of) - 1, (
+        f"{estimate}: {len(several.of) - len(others)} entries of this name"
+    )
+    return replace(pipeline, estimate=replace(several, of=others))
+
+
+def measured(job: Job) -> list[Row]:
+    """Rows of a pair, without each move in turn."""
+    one = case(job)
+    rows = [{**measure(one, NONE), "job": job}]
+    easy = rows[0]["entries"] == 1
+    return rows + [measure(one, move) for move in MOVES[1:] if not (easy and move in _OF_LATER)]
 
 
 def table(rows: list[Row]) -> str:
@@ -107,7 +149,7 @@ def table(rows: list[Row]) -> str:
         "over those with it |",
         "|---|---|---|---|---|---|",
     ]
-    for move in list(MOVES)[1:]:
+    for move in MOVES[1:]:
         off = [row for row in rows if row["without"] == move and row["pair"] in with_all]
         on = [with_all[row["pair"]] for row in off]
         if not off:
@@ -135,25 +177,19 @@ def main() -> None:
     )
     parser.add_argument("--pairs", type=int, default=20, help="of each tier")
     parser.add_argument("--rows", type=Path, default=Path("runs/moves.jsonl"))
+    parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--real", type=Path, default=Path("../shared/data/real"))
     parser.add_argument("--table", type=Path)
     options = parser.parse_args()
     rows = read(options.rows)
-    held = {(row["pair"], row["without"]) for row in rows}
+    held = {tuple(row["job"]) for row in rows if "job" in row}
     options.rows.parent.mkdir(parents=True, exist_ok=True)
-    with options.rows.open("a") as file:
-        for case in cases(options.pairs, options.real):
-            easy = any(
-                r["pair"] == case.pair.id and r["without"] == "none" and r["entries"] == 1 for r in rows
-            )
-            for move in MOVES:
-                if (case.pair.id, move) in held or (easy and move not in _OF_THE_FIRST):
-                    continue
-                row = measure(case, move)
-                easy |= move == "none" and row["entries"] == 1
-                rows.append(row)
-                file.write(json.dumps(row) + "\n")
-                file.flush()
+    todo = [job for job in jobs(options.pairs, options.real) if job not in held]
+    with ProcessPoolExecutor(options.workers) as pool, options.rows.open("a") as file:
+        for made in pool.map(measured, todo):
+            rows.extend(made)
+            file.write("".join(json.dumps(row) + "\n" for row in made))
+            file.flush()
     print(table(rows))
     if options.table:
         options.table.write_text(table(rows))
