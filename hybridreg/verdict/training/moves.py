@@ -125,7 +125,7 @@ def measure(case: Case, without: str) -> Row:
 def without_entry(pipeline: Pipeline, estimate: str) -> Pipeline:
     several = pipeline.estimate
     others = tuple(
-        entry for entry in several.of if not registry.name_of(entry["estimate"]).endswith(estimate)
+        entry for entry in several.of if registry.name_of(entry["estimate"]) != f"estimate.{estimate}"
     )
     assert len(others) == len(several.of) - 1, (
         f"{estimate}: {len(several.of) - len(others)} entries of this name"
