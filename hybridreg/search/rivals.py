@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from hybridreg.evidence import log_odds, match_agreement
+from hybridreg.evidence import match_agreement
 from hybridreg.evidence.pose_evidence import PoseEvidence
 from hybridreg.geometry import se3
 from hybridreg.matches import Pose
@@ -41,18 +41,12 @@ def find(scene: Scene, own: PoseEvidence, pose: Pose) -> list[Hypothesis]:
     known, guesses = parted(as_hypotheses(pose)[1 : 1 + _OFFERED])
     guesses += [*_turned(own), *copies(views, own.T, own.agreement.axes)]
     promising = [*known, *seen_at(scene, [T for T in guesses if is_rival(T)], _QUICK)]
-    found: list[Hypothesis] = []
-    for guess in best(with_matches(one) for one in promising if is_rival(one.T))[:_SETTLED]:
-        rival = guess
-        if not guess.settled:
-            T = settle(views, guess.T)
-            rival = Hypothesis(at=PoseEvidence(views, T), by_surfaces=log_odds.of(views, T, _CLOSE))
-        # Guesses that come back to the pose are no rivals, and must not hide those behind them.
-        if is_rival(rival.T):
-            found.append(with_matches(rival))
-        if len(found) == _ENOUGH:
-            break
-    return best(found)
+    likeliest = best(with_matches(one) for one in promising if is_rival(one.T))[:_SETTLED]
+    guessed = np.array([one.T for one in likeliest if not one.settled]).reshape(-1, 4, 4)
+    moved = iter(seen_at(scene, settle(views, guessed), _CLOSE))
+    rivals = [one if one.settled else next(moved) for one in likeliest]
+    # Guesses that come back to the pose are no rivals, and must not hide those behind them.
+    return best([with_matches(one) for one in rivals if is_rival(one.T)][:_ENOUGH])
 
 
 def _turned(own: PoseEvidence) -> list[Array]:
