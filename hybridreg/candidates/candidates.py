@@ -21,7 +21,7 @@ from hybridreg.matches import Correspondences, EntryTrace, Overlap, Pose
 from hybridreg.resolution import comparable, size_ratio
 from hybridreg.scene import Scene
 from hybridreg.search.basin_hopping import hop
-from hybridreg.search.hypothesis import Hypothesis, as_hypotheses, as_pose
+from hybridreg.search.hypothesis import Found, Hypothesis, as_hypotheses, as_pose
 from hybridreg.search.pattern_search import climb
 from hybridreg.search.ranking import HOPELESS, counted, distinct
 from hybridreg.search.settle import best_first, second_look
@@ -34,9 +34,6 @@ Entry = Mapping[str, Any]
 _SLOTS = ("overlap", "match", "estimate")
 # Confidence from which the user is believed to have made no mistake: by hand.
 _SURE = 0.99
-# Entries after which no other is run where all that was found is hopeless: of 200 pairs (`sim:val`, `sim:train`, hard
-# kinds) none was solved by a later one.
-_SUFFICE = 2
 # Poses of each entry that are looked at, its own and the best of its rivals: by hand.
 _LOOKED_AT = 8
 # How many of these are refined at most: by hand.
@@ -64,9 +61,8 @@ class Candidates(Stage):
     Every pose that an entry offers is settled and ranked by its log-odds (`hybridreg.evidence.log_odds`), the best are
     refined, and the best of these is weighed with the others as its rivals. A pose that several entries found is more
     credible; one that the surfaces hardly constrain is moved to where it is likelier. Later entries are not run once
-    the confidence is `enough`, nor after two that found nothing but hopeless poses: such clouds show different places.
-    Where no entry brings it, all starts are examined a second time, and likelier poses are looked for around the
-    best. What was not chosen is returned as `rivals`, what each entry did as `entries`.
+    the confidence is `enough`. Where none brings it, all starts are examined a second time, and likelier poses are
+    looked for around the best. What was not chosen is returned as `rivals`, what each entry did as `entries`.
 
     Parameters
     ----------
@@ -80,11 +76,15 @@ class Candidates(Stage):
         is tried, as it would converge to nothing.
     enough : float in [0, 1]
         Confidence at which the search stops (the verdict's "ok"); 1 tries every entry.
+    give_up_after : int or None
+        Entries after which no other is run where all poses so far are hopeless: where the first ones search everywhere,
+        such clouds show different places. None runs them all.
     """
 
     of: tuple[Entry, ...] = ({"estimate": "birdseye"}, {"estimate": "kiss"})
     refine: Any = "gicp"
     enough: float = OK
+    give_up_after: int | None = None
 
     def __post_init__(self) -> None:
         if isinstance(self.refine, (str, Mapping)):
@@ -97,6 +97,10 @@ class Candidates(Stage):
             _check(entry)
         if not 0.0 <= self.enough <= 1.0:
             raise ValueError(f"enough={self.enough} must lie between 0 and 1")
+        if self.give_up_after is not None and self.give_up_after < 1:
+            raise ValueError(
+                f"give_up_after={self.give_up_after} must be at least 1, or None to run every entry"
+            )
 
     def __call__(self, scene: Scene, matches: Correspondences, rng: np.random.Generator) -> Pose:
         found: list[Hypothesis] = []
@@ -147,7 +151,7 @@ class Candidates(Stage):
         # A generator each, so that an entry's answer does not hang on those before it.
         *generators, last = rng.spawn(len(self.of) + 1)
         for tried, (entry, own) in enumerate(zip(self.of, generators, strict=True)):
-            if tried >= _SUFFICE and found and found[0].log_odds < HOPELESS:
+            if tried == self.give_up_after and found and Found.of(scene).highest < HOPELESS:
                 return
             name, start = _name(entry), time.perf_counter()
             here: list[Hypothesis] = []

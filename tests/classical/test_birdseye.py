@@ -130,6 +130,22 @@ def test_levelled_by_the_sensors_frames_only_upright_ones_fit(tilt: float, right
     assert (degrees < 1.5 and metres < 0.4) == right
 
 
+@pytest.mark.parametrize(("tilt", "searches"), [(1.0, 1), (30.0, 2)])
+def test_a_search_by_the_sensors_follows_only_where_a_ground_leans(
+    tilt: float, searches: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pair, _ = two_views(pose(8.0, -5.0, 70.0, tilt), pose(0.0, 0.0, 0.0, 0.0))
+    laid: list[object] = []
+
+    def nothing(*args: object) -> list[object]:
+        laid.append(args)
+        return []
+
+    monkeypatch.setattr(hr.BirdsEye, "_laid", nothing)
+    run(pair, vertical="both")
+    assert len(laid) == searches
+
+
 RNG = np.random.default_rng(0)
 FLAT = np.column_stack([RNG.uniform(-30, 30, (4000, 2)), RNG.normal(-1.8, 0.01, 4000)])
 HOSTILE = {
@@ -167,7 +183,7 @@ def test_disjoint_places_give_some_pose_within_reach() -> None:
 @pytest.mark.parametrize(
     ("fields", "words"),
     [
-        ({"vertical": "wall"}, "'ground' or 'sensor'"),
+        ({"vertical": "wall"}, "'ground', 'sensor' or 'both'"),
         ({"voxel": 0.0}, "voxel=0.0"),
         ({"layers": (1.0,)}, "two or more"),
         ({"layers": (2.0, 1.0)}, "rising"),

@@ -50,7 +50,6 @@ PATCHES: dict[str, tuple[Any, str, Any]] = {
     "second spectrum": (birdseye, "_LEVELLED", birdseye._LEVELLED[:1]),
     "sliding along a street": (birdseye.BirdsEye, "_slid", lambda self, source, target, voxel: []),
     "bird's-eye by sensors": (birdseye, "_leans", lambda own: False),
-    "stop where hopeless": (candidates, "_SUFFICE", len(TIERS) * len(ENTRIES)),
     "pattern search": (candidates, "_polished", lambda scene, found: found),
     "basin hopping": (candidates, "hop", lambda scene, poses, rng: []),
     "second look": (candidates, "second_look", lambda scene: []),
@@ -58,9 +57,10 @@ PATCHES: dict[str, tuple[Any, str, Any]] = {
     "half turns as rivals": (rivals, "_turned", lambda own: []),
 }
 NONE = "none"
-MOVES = (NONE, *PATCHES, *ENTRIES)
+GIVING_UP = "giving up where hopeless"
+MOVES = (NONE, *PATCHES, GIVING_UP, *ENTRIES)
 # Those that a pair is spared which the first entry answers beyond doubt.
-_OF_LATER = ("stop where hopeless", "pattern search", "basin hopping", "second look", *ENTRIES)
+_OF_LATER = (GIVING_UP, "pattern search", "basin hopping", "second look", *ENTRIES)
 
 
 # A group, or the folder of real pairs, and which of its pairs.
@@ -112,6 +112,8 @@ def measure(case: Case, without: str) -> Row:
     pipeline = Pipeline.preset("default")
     if without in ENTRIES:
         pipeline = without_entry(pipeline, ENTRIES[without])
+    if without == GIVING_UP:
+        pipeline = replace(pipeline, estimate=replace(pipeline.estimate, give_up_after=None))
     start = time.process_time()
     with mock.patch.object(*PATCHES[without]) if without in PATCHES else nullcontext():
         result = pipeline.run(case.pair)
