@@ -56,6 +56,16 @@ def code(value: Any) -> str:
     return f"<pre>{escape(json.dumps(value, indent=1))}</pre>"
 
 
+def verbatim(text: str) -> str:
+    """Text as it stands, to be copied."""
+    return f"<pre>{escape(text)}</pre>"
+
+
+def folded(title: str, piece: str) -> str:
+    """A piece of a page that is shown when its title is clicked."""
+    return f"<details><summary>{escape(title)}</summary>{piece}</details>"
+
+
 def filterable(lines: Sequence[Cells], *, success: str, text_from: str) -> str:
     """A long table with a search box; `success` is the column that "missed only" looks at."""
     head = list(lines[0])
@@ -71,7 +81,7 @@ def filterable(lines: Sequence[Cells], *, success: str, text_from: str) -> str:
         '<p><input type="search" id="pairs-filter" placeholder="words to look for"> '
         '<label><input type="checkbox" id="pairs-missed"> missed only</label> '
         '<span id="pairs-count"></span></p>\n'
-        f'<div class="scroll"><table id="pairs"><thead><tr>{cells}</tr></thead>'
+        f'<div class="scroll tall"><table id="pairs"><thead><tr>{cells}</tr></thead>'
         "<tbody></tbody></table></div>\n"
         f'<script type="application/json" id="pairs-data">{stored}</script>'
     )

@@ -52,7 +52,9 @@ def residual_pictures(laid: LaidOut, most: float) -> Iterator[str]:
             points[:, axes[0]], points[:, axes[1]], s=1.2, c=residual, cmap="turbo", vmin=0.0, vmax=most,
             linewidths=0, rasterized=True,
         )  # fmt: skip
-        bar = figure.colorbar(drawn, ax=panel, location="bottom", shrink=0.8, extend="max", aspect=30, pad=0.02)
+        bar = figure.colorbar(
+            drawn, ax=panel, location="bottom", shrink=0.8, extend="max", aspect=30, pad=0.02
+        )
         bar.set_label("distance to the target's surface, m", color=_INK, fontsize=9)
         bar.ax.tick_params(colors=_INK, labelsize=9)
         bar.locator = MaxNLocator(4)
@@ -74,7 +76,9 @@ def violation_picture(laid: LaidOut) -> str:
             )
     if len(laid.violations):
         x, y = laid.violations[:, :2].T
-        panel.scatter(x, y, s=22, facecolors="none", edgecolors=_THROUGH, linewidths=1.2, label="seen through")
+        panel.scatter(
+            x, y, s=22, facecolors="none", edgecolors=_THROUGH, linewidths=1.2, label="seen through"
+        )
     _legend(panel)
     return _picture(figure, "Free-space violations from above", "Where a sensor saw through, from above")
 
@@ -114,7 +118,14 @@ def _dots(panel: Any, points: Array, colour: str, size: float, alpha: float = 1.
 def _legend(panel: Any) -> None:
     if panel.get_legend_handles_labels()[0]:
         panel.legend(
-            loc="upper center", bbox_to_anchor=(0.5, -0.13), ncols=3, fontsize=9, columnspacing=1.0, handletextpad=0.3, frameon=False, labelcolor=_INK
+            loc="upper center",
+            bbox_to_anchor=(0.5, -0.13),
+            ncols=3,
+            fontsize=9,
+            columnspacing=1.0,
+            handletextpad=0.3,
+            frameon=False,
+            labelcolor=_INK,
         )
 
 

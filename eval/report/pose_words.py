@@ -14,8 +14,8 @@ Array = NDArray[np.float64]
 
 # What roll, pitch and yaw mean here.
 CONVENTION = (
-    "R = Rz(yaw) Ry(pitch) Rx(roll): turns about the target's fixed axes x, then y, then z, the same as yaw, pitch, roll "
-    "about the turned axes"
+    "R = Rz(yaw) Ry(pitch) Rx(roll): turns about the target's fixed axes x, then y, then z, the same as yaw, pitch, "
+    "roll about the turned axes"
 )
 # Pitch from which roll and yaw turn about one line, degrees: by hand.
 _LOCKED = 89.9

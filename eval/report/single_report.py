@@ -94,7 +94,9 @@ def html(pair: Pair, result: RegistrationResult, origin: Origin = Origin()) -> s
         page.html_table(_clouds(pair, origin)),
         page.heading("Pose"),
         page.listed(pose_words.pose(result)),
-        page.paragraph("As a matrix, T_target_source, which maps source points to target points (q = R p + t):"),
+        page.paragraph(
+            "As a matrix, T_target_source, which maps source points to target points (q = R p + t):"
+        ),
         _matrix(result),
         page.heading("Accuracy", 3),
         page.paragraph(
@@ -159,11 +161,15 @@ def _pictures(pair: Pair, result: RegistrationResult, laid: LaidOut) -> Iterator
     yield page.heading("Overlay and free space")
     yield page.panels([*pose_pictures.residual_pictures(laid, most), pose_pictures.violation_picture(laid)])
     yield page.paragraph(
-        f"The target is grey. Of the source, {np.isfinite(laid.residual).mean():.0%} have a surface of the target near by and "
-        "are coloured by their distance to it; the others, which the target's sensor did not see, are sand."
+        f"The target is grey. Of the source, {np.isfinite(laid.residual).mean():.0%} have a surface of the target near "
+        "by and are coloured by their distance to it; the others, which the target's sensor did not see, are sand."
     )
     unseen = [f"the {name}'s" for name, places in laid.sensors.items() if not len(places)]
-    untested = f" From {' and '.join(unseen)} sensor it could not be tested: its place is not known." if unseen else ""
+    untested = (
+        f" From {' and '.join(unseen)} sensor it could not be tested: its place is not known."
+        if unseen
+        else ""
+    )
     yield page.paragraph(
         f"{len(laid.violations)} of {laid.looked} sampled points lie where the other sensor saw through.{untested}"
     )
@@ -205,9 +211,8 @@ def _evidence(result: RegistrationResult) -> Iterator[str]:
     own = {"fitness": result.fitness, "fitness of the target": result.fitness_target}
     own |= {"inlier RMSE, m": result.inlier_rmse}
     facts = {name: number(float(value), 4) for name, value in {**own, **result.evidence}.items()}
-    yield "<details><summary>Every number behind the verdict</summary>"
-    yield page.html_table([{"fact": name, "value": value} for name, value in facts.items()])
-    yield "</details>"
+    table = page.html_table([{"fact": name, "value": value} for name, value in facts.items()])
+    yield page.folded("Every number behind the verdict", table)
 
 
 def _time(result: RegistrationResult) -> Iterator[str]:
@@ -215,7 +220,9 @@ def _time(result: RegistrationResult) -> Iterator[str]:
     yield page.paragraph(f"{total:.2f} s together.")
     yield page.html_table([{"stage": name, "seconds": number(s, 3)} for name, s in result.seconds.items()])
     if result.entries:
-        yield page.paragraph(f"Within the estimate, by entry; the pose was found by {result_words.found_by(result)}.")
+        yield page.paragraph(
+            f"Within the estimate, by entry; the pose was found by {result_words.found_by(result)}."
+        )
         yield page.html_table(
             [
                 {
@@ -232,9 +239,7 @@ def _time(result: RegistrationResult) -> Iterator[str]:
 
 def _again(result: RegistrationResult, origin: Origin) -> Iterator[str]:
     if origin.command:
-        yield f"<pre>{escape(origin.command)}</pre>"
+        yield page.verbatim(origin.command)
     for note in result.notes:
         yield page.paragraph(f"Note: {note}")
-    yield "<details><summary>The whole result as JSON, with the pipeline's settings</summary>"
-    yield page.code(result.to_dict())
-    yield "</details>"
+    yield page.folded("The whole result as JSON, with the pipeline's settings", page.code(result.to_dict()))

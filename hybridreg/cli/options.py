@@ -141,7 +141,9 @@ def both(text: str | None, option: str) -> tuple[str, str]:
         return "", ""
     source, comma, target = text.partition(",")
     if not comma or "," in target:
-        raise ValueError(f"{option} {text}: give two names with one comma, such as {option} 'Livox Avia,HDL-64E'")
+        raise ValueError(
+            f"{option} {text}: give two names with one comma, such as {option} 'Livox Avia,HDL-64E'"
+        )
     return source.strip(), target.strip()
 
 

@@ -126,13 +126,17 @@ def test_clouds_are_laid_out_at_the_pose(demo: Pair, result: hr.RegistrationResu
     assert np.allclose(laid.source, se3.apply(result.transformation, laid.before))
     assert np.nanmedian(laid.residual) < 0.05
     assert len(laid.violations) / laid.looked == pytest.approx(result.evidence["looked_through"], abs=0.003)
-    off = replace(result, transformation=se3.from_rt(np.eye(3), np.array([6.0, 0, 0])) @ result.transformation)
+    off = replace(
+        result, transformation=se3.from_rt(np.eye(3), np.array([6.0, 0, 0])) @ result.transformation
+    )
     wrong = laid_out.of(demo, off)
     assert np.nanmedian(wrong.residual) > 2 * np.nanmedian(laid.residual)
     assert len(wrong.violations) > 3 * len(laid.violations)
 
 
-def test_map_coordinates_scale_and_unknown_viewpoints_are_drawn(result: hr.RegistrationResult, demo: Pair) -> None:
+def test_map_coordinates_scale_and_unknown_viewpoints_are_drawn(
+    result: hr.RegistrationResult, demo: Pair
+) -> None:
     far = np.array([500_000.0, 5_400_000.0, 100.0])
     pair = Pair.of(demo.source.points / 1.02, demo.target.points + far, target_viewpoint="none")
     T = se3.from_rt(np.eye(3), far) @ result.transformation

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """The quantiles in `hybridreg/verdict/usual.json`, from the rows that the verdict's rules are fitted to.
 
-    python -m hybridreg.verdict.training usual --rows runs/evidence.jsonl --write hybridreg/verdict
+python -m hybridreg.verdict.training usual --rows runs/evidence.jsonl --write hybridreg/verdict
 """
 
 from __future__ import annotations
