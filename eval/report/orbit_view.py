@@ -15,7 +15,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from hybridreg.eval.report import page
+from hybridreg.eval.report.laid_out import residuals, thinned
+from hybridreg.evidence.surface_distance import FineSurfaces
+from hybridreg.frames import lower_pose
 from hybridreg.geometry import se3
+from hybridreg.pair import Pair
+from hybridreg.resolution import tolerance
 
 Array = NDArray[np.float64]
 
@@ -92,10 +98,26 @@ def _frame(layers: Sequence[Layer]) -> dict[str, object]:
     return {"middle": ((low + high) / 2).tolist(), "half": max(float(np.max(high - low)) / 2, 1e-6)}
 
 
-def pose_layers(source: Array, target: Array, T: Array) -> list[Layer]:
-    """Both clouds (N, 3) and (M, 3) in the target's frame, the source at T (4, 4) and as it came."""
-    return [
-        Layer("target", target, "#3b6fb6"),
-        Layer("source at the pose", se3.apply(T, source), "#d95f02"),
-        Layer("source before", source, "#999999", shown=False),
+def pair_page(pair: Pair, T: Array, title: str, drawn: int) -> str:
+    """A page of both clouds in the target's frame, the source coloured by its distance to the target's surfaces.
+
+    Parameters
+    ----------
+    T : (4, 4), source to target, in the user's coordinates
+    drawn : points of each cloud, at most
+    """
+    source, target = (thinned(cloud.points, drawn) for cloud in (pair.source, pair.target))
+    lowered = lower_pose(T, pair)
+    moved = se3.apply(lowered, source)
+    most = 0.5 * tolerance(pair.source, pair.target).metres
+    shade = residuals(moved, FineSurfaces.of(pair).target) / most
+    layers = [
+        Layer("target", target, "#8f99a8"),
+        Layer("source", moved, "#c9b458", shade=shade),
+        Layer("source as it came", source, "#a6761d", shown=False),
     ]
+    words = (
+        f"The source is coloured by its distance to the target's surfaces, blue 0 to red {most:g} m and more; sand "
+        f"where none is near. {len(source):,} of {len(pair.source):,} and {len(target):,} of {len(pair.target):,} points."
+    )
+    return page.page(title, [page.heading(title, 1), html(layers), page.paragraph(words), script()])
