@@ -118,6 +118,7 @@ def pair_page(pair: Pair, T: Array, title: str, drawn: int) -> str:
     ]
     words = (
         f"The source is coloured by its distance to the target's surfaces, blue 0 to red {most:g} m and more; sand "
-        f"where none is near. {len(source):,} of {len(pair.source):,} and {len(target):,} of {len(pair.target):,} points."
+        f"where none is near. Drawn are {len(source):,} of its {len(pair.source):,} points, and {len(target):,} of "
+        f"the target's {len(pair.target):,}."
     )
     return page.page(title, [page.heading(title, 1), html(layers), page.paragraph(words), script()])
