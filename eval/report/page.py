@@ -58,7 +58,7 @@ def code(value: Any) -> str:
 
 def verbatim(text: str) -> str:
     """Text as it stands, to be copied."""
-    return f"<pre>{escape(text)}</pre>"
+    return f'<pre class="wrapped">{escape(text)}</pre>'
 
 
 def folded(title: str, piece: str) -> str:

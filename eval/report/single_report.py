@@ -40,7 +40,7 @@ _REDDEST = 0.5
 class Origin(NamedTuple):
     """Where a registration came from, for the reader of its page: free text, may be empty.
 
-    source, target : names of the files
+    source, target : the files, by their paths
     source_sensor, target_sensor : what recorded them
     command : what makes the page again
     """
@@ -118,7 +118,8 @@ def html(pair: Pair, result: RegistrationResult, origin: Origin = Origin()) -> s
 def _made(origin: Origin) -> str:
     import hybridreg
 
-    names = f"{origin.source} onto {origin.target}. " if origin.source and origin.target else ""
+    source, target = Path(origin.source).name, Path(origin.target).name
+    names = f"{source} onto {target}. " if source and target else ""
     return f"{names}{datetime.now().astimezone():%d %B %Y, %H:%M %Z}, hybridreg {hybridreg.__version__}."
 
 

@@ -101,7 +101,7 @@ def command(
     if out is not None:
         from hybridreg.eval.report import single_report
 
-        origin = single_report.Origin(source.name, target.name, source_sensor, target_sensor, typed(context))
+        origin = single_report.Origin(str(source), str(target), source_sensor, target_sensor, typed(context))
         files = single_report.write(pair, result, out, origin)
         print(f"written to {out}: {', '.join(file.name for file in files)}")
     if result.verdict == "failed":
