@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hybridreg.data.dataset import ids_of
 from hybridreg.eval.report import formats, line_styles, orbit_view, page, plotly_figures
@@ -28,8 +27,6 @@ from hybridreg.geometry import se3
 from hybridreg.io import write_text
 from hybridreg.pair import LabelledPair, Pair
 from hybridreg.runtime import optional_packages
-
-Array = NDArray[np.float64]
 
 _MOST_VIEWS = 8
 # Points of a cloud in a view: eight of them take a megabyte.
@@ -170,7 +167,6 @@ def _views(table: Table, protocol: Protocol, pairs: Sequence[LabelledPair] | Non
     for number_of, (name, row) in enumerate(worst(table, protocol)):
         if row.id not in ids or row.T_true is None:
             continue
-        found = np.eye(4) if row.T is None else np.array(row.T)
         yield page.heading(f"{row.id}, {name}", 3)
         yield page.paragraph(_told(row))
         try:
@@ -178,16 +174,19 @@ def _views(table: Table, protocol: Protocol, pairs: Sequence[LabelledPair] | Non
         except (OSError, ValueError) as error:  # data that was damaged since must not prevent the report
             yield page.paragraph(f"There is no view: {one_line(error)}")
             continue
-        yield orbit_view.html(_layers(pair, found, np.array(row.T_true)), f"view-{number_of}")
+        yield orbit_view.html(_layers(pair, row), f"view-{number_of}")
 
 
-def _layers(pair: Pair, found: Array, truth: Array) -> list[orbit_view.Layer]:
+def _layers(pair: Pair, row: Row) -> list[orbit_view.Layer]:
+    # Without a pose as it came, in the small coordinates that both clouds are drawn in.
+    found = np.eye(4) if row.T is None else lower_pose(np.array(row.T), pair)
+    truth = lower_pose(np.array(row.T_true), pair)
     source, target = (thinned(cloud.points, _DRAWN) for cloud in (pair.source, pair.target))
     layer = orbit_view.Layer
     return [
         layer("target", target, "#8f99a8"),
-        layer("source, aligned", se3.apply(lower_pose(found, pair), source), "#d95f02"),
-        layer("source, true pose", se3.apply(lower_pose(truth, pair), source), "#1b9e77"),
+        layer("source, aligned", se3.apply(found, source), "#d95f02"),
+        layer("source, true pose", se3.apply(truth, source), "#1b9e77"),
         layer("source, before", source, "#a6761d", shown=False),
     ]
 

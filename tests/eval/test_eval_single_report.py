@@ -208,3 +208,10 @@ def _with(R: Any) -> Any:
         scale_verdict = None
 
     return Some()
+
+
+def test_no_part_of_a_page_is_wider_than_a_phone() -> None:
+    style = files("hybridreg.eval.report").joinpath("page.html").read_text().partition("</style>")[0]
+    # A width in pixels must give way: as a largest one, or as the smaller of itself and the page's.
+    rigid = re.sub(r"max-width: *\d+px|min\(\d+px, 100%\)|min\(\d+vh, \d+px\)|@media[^{]*", "", style)
+    assert not [each for each in re.findall(r"(\d+)px", rigid) if int(each) > 100]
