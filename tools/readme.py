@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: MIT
 """Put measured tables into a page between their markers, so that no figure there is typed by hand.
 
-    python -m tools.readme real=runs/real/table.md peers=runs/peers.md
+    python -m tools.readme peers=runs/peers.md
+    python -m tools.readme --page docs/results.md real=runs/real/table.md learned-mid=runs/learned-mid/table.md
 
-replaces the text in README.md between `<!-- real -->` and `<!-- /real -->` by that file, and so on; of a file that
+replaces the text in README.md between `<!-- peers -->` and `<!-- /peers -->` by that file, and so on; of a file that
 `hybridreg table` wrote, by its first protocol's caption, results and verdicts, or the given `--sections`, by the
-beginnings of their titles. `--page docs/simulator.md` names another page.
+beginnings of their titles. `--page` names another page.
 """
 
 from __future__ import annotations

@@ -94,12 +94,18 @@ def latex(table: Table, protocols: Sequence[Protocol]) -> str:
     """The table of every protocol as papers print it, in four columns, for the package booktabs."""
     parts = []
     for each in protocols:
-        lines = [table_columns.printed(name, score) for name, score in table.scores(each).items()]
-        parts.append(_latex_table(f"{table.caption(each)}. Recall with its 95 % interval", lines))
+        parts.append(
+            _latex_table(f"{table.caption(each)}. Recall with its 95 % interval", printed(table, each))
+        )
     if table.paper is not None:
         parts.append(_latex_table(table.paper.heading(), table.paper.cells()))
     parts.extend(f"\\noindent {_escape(remark)}\n" for remark in table.remarks())
     return "\n".join(parts)
+
+
+def printed(table: Table, protocol: Protocol) -> list[Cells]:
+    """A protocol's lines as papers print them."""
+    return [table_columns.printed(name, score) for name, score in table.scores(protocol).items()]
 
 
 def _latex_table(caption: str, lines: Sequence[Cells]) -> str:

@@ -4,45 +4,47 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from hybridreg.eval.report.line_styles import Style
 from hybridreg.eval.run.row import Row
 from hybridreg.eval.score import curves, errors
 from hybridreg.eval.score.protocols import Protocol
-from hybridreg.geometry import se3
 
 if TYPE_CHECKING:
     from plotly.graph_objects import Figure
 
 Array = NDArray[np.float64]
 
-# Points drawn per cloud: enough to see walls and poles, few enough for a page with several views.
-THINNED = 4000
-BEFORE = "#999999"  # grey
-AFTER = "#d95f02"  # orange
-TRUE = "#1b9e77"  # green
-TARGET = "#3b6fb6"  # blue
+# Lettering and axes: grey, on white paper as on black.
+_INK = "#808080"
 
 
-def recall_curves(rows: Mapping[str, Sequence[Row]], protocol: Protocol) -> list[Figure]:
+def recall_curves(
+    rows: Mapping[str, Sequence[Row]], looks: Mapping[str, Style], protocol: Protocol
+) -> list[Figure]:
     """Recall against the rotation and the translation threshold, one line a method."""
     measured = {name: errors.of(each) for name, each in rows.items()}
     return [
         _curve_figure(
             {name: curves.sweep(e, protocol, "rre") for name, e in measured.items()},
+            looks,
             f"RRE threshold, ° (RTE < {protocol.rte_m:g} m)",
+            protocol.rre_deg,
         ),
         _curve_figure(
             {name: curves.sweep(e, protocol, "rte") for name, e in measured.items()},
+            looks,
             f"RTE threshold, m (RRE < {protocol.rre_deg:g}°)",
+            protocol.rte_m,
         ),
     ]
 
 
-def confidence(rows: Mapping[str, Sequence[Row]], protocol: Protocol) -> Figure:
+def confidence(rows: Mapping[str, Sequence[Row]], looks: Mapping[str, Style], protocol: Protocol) -> Figure:
     """Confidence of every pair against its worst error in units of the thresholds; below 1 is a success."""
     from plotly.graph_objects import Figure
 
@@ -54,15 +56,16 @@ def confidence(rows: Mapping[str, Sequence[Row]], protocol: Protocol) -> Figure:
                 x=[row.confidence for row in told],
                 y=np.maximum(badness(told, protocol), 1e-3),
                 mode="markers",
+                marker={"color": looks[name].colour},
                 name=name,
                 text=[f"{row.id}: {row.verdict}" for row in told],
             )
-    figure.add_hline(y=1.0, line_dash="dot")
+    figure.add_hline(y=1.0, line_dash="dot", line_color=_INK)
     figure.update_yaxes(type="log", title="error / threshold (success below 1)")
     return _dressed(figure, "confidence")
 
 
-def reliability(rows: Mapping[str, Sequence[Row]], protocol: Protocol) -> Figure:
+def reliability(rows: Mapping[str, Sequence[Row]], looks: Mapping[str, Style], protocol: Protocol) -> Figure:
     """Reliability diagram: share of successes among pairs of similar confidence; calibrated on the diagonal."""
     from plotly.graph_objects import Figure
 
@@ -77,10 +80,11 @@ def reliability(rows: Mapping[str, Sequence[Row]], protocol: Protocol) -> Figure
                 x=bins[:, 0],
                 y=100.0 * bins[:, 1],
                 mode="lines+markers",
+                line={"color": looks[name].colour, "dash": looks[name].plotly},
                 name=name,
                 text=[f"{n:.0f} pairs" for n in bins[:, 2]],
             )
-    figure.add_shape(type="line", x0=0, y0=0, x1=1, y1=100, line_dash="dot")
+    figure.add_shape(type="line", x0=0, y0=0, x1=1, y1=100, line_dash="dot", line_color=_INK)
     figure.update_yaxes(title="successes, %", range=[-2, 102])
     return _dressed(figure, "confidence, in fifths")
 
@@ -101,37 +105,11 @@ def badness(rows: Sequence[Row], protocol: Protocol) -> Array:
     return result
 
 
-def clouds(source: Array, target: Array, T: Array, truth: Array | None = None) -> Figure:
-    """Both clouds in the target's frame: the source before alignment, after it, and under the true pose.
-
-    Parameters
-    ----------
-    source, target : (N, 3), (M, 3), metres
-    T, truth : (4, 4), source to target
-    """
-    from plotly.graph_objects import Figure
-
-    moving = thin(source)
-    figure = Figure()
-    _add_cloud(figure, thin(target), "target", TARGET, True)
-    _add_cloud(figure, se3.apply(T, moving), "source, aligned", AFTER, True)
-    _add_cloud(figure, moving, "source, before", BEFORE, "legendonly")
-    if truth is not None:
-        _add_cloud(figure, se3.apply(truth, moving), "source, true pose", TRUE, "legendonly")
-    figure.update_layout(
-        height=480, margin={"l": 0, "r": 0, "t": 0, "b": 0}, scene={"aspectmode": "data"}, legend={"y": 0.95}
-    )
-    return figure
-
-
-def thin(points: Array, n: int = THINNED) -> Array:
-    """About `n` of the points (N, 3), evenly along the file."""
-    return points[:: max(1, len(points) // n)]
-
-
 def to_html(figure: Figure) -> str:
     """A figure as a piece of a page that already contains plotly's script."""
-    text: str = figure.to_html(full_html=False, include_plotlyjs=False, config={"displaylogo": False})
+    # Without plotly's bar of buttons, which lies over the curves; drag and double-click zoom without it.
+    config = {"displayModeBar": False, "responsive": True}
+    text: str = figure.to_html(full_html=False, include_plotlyjs=False, config=config)
     return text
 
 
@@ -143,33 +121,34 @@ def script() -> str:
     return text
 
 
-def _add_cloud(figure: Figure, points: Array, name: str, colour: str, visible: Any) -> None:
-    x, y, z = np.round(points, 2).astype(np.float32).T
-    figure.add_scatter3d(
-        x=x,
-        y=y,
-        z=z,
-        mode="markers",
-        name=name,
-        visible=visible,
-        hoverinfo="skip",
-        marker={"size": 1.5, "color": colour},
-    )
-
-
-def _curve_figure(lines: Mapping[str, curves.Curve], title: str) -> Figure:
+def _curve_figure(
+    lines: Mapping[str, curves.Curve], looks: Mapping[str, Style], title: str, at: float
+) -> Figure:
     from plotly.graph_objects import Figure
 
     figure = Figure()
     for name, curve in lines.items():
-        figure.add_scatter(x=curve.threshold, y=100.0 * curve.recall, name=name, mode="lines")
+        line = {"color": looks[name].colour, "dash": looks[name].plotly, "width": 2}
+        figure.add_scatter(
+            x=curve.threshold, y=100.0 * curve.recall, name=name, mode="lines", line=line, cliponaxis=False
+        )
+    figure.add_vline(x=at, line_dash="dot", line_color=_INK, line_width=1)
     figure.update_yaxes(title="recall, %", range=[-2, 102])
     return _dressed(figure, title)
 
 
 def _dressed(figure: Figure, x_title: str) -> Figure:
     figure.update_xaxes(title=x_title)
+    axis = {"color": _INK, "gridcolor": "rgba(128,128,128,0.25)", "zerolinecolor": "rgba(128,128,128,0.5)"}
+    figure.update_xaxes(**axis)
+    figure.update_yaxes(**axis)
     figure.update_layout(
-        height=360, margin={"l": 60, "r": 10, "t": 10, "b": 50}, template="simple_white", showlegend=True
+        height=340,
+        margin={"l": 55, "r": 12, "t": 12, "b": 45},
+        template="none",
+        showlegend=False,  # one for all panels stands above them
+        paper_bgcolor="rgba(0,0,0,0)",
+        plot_bgcolor="rgba(0,0,0,0)",
+        font={"color": _INK},
     )
     return figure

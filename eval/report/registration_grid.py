@@ -56,7 +56,8 @@ def write(
         line[0].set_ylabel(name)
         for axes, entry in zip(line[1:-1], entries, strict=True):
             row = row_of(entry, name)
-            T = np.eye(4) if row is None or row.T is None else np.array(row.T)
+            # Without a pose as it came, in the small coordinates that both clouds are drawn in.
+            T = np.eye(4) if row is None or row.T is None else lower_pose(np.array(row.T), labelled.pair)
             draw_clouds(axes, se3.apply(T, source), target, frame)
             _judge(axes, row, protocol)
         for axes in line:

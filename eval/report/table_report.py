@@ -6,24 +6,31 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from hybridreg.data.dataset import ids_of
-from hybridreg.eval.report import formats, page, plotly_figures
+from hybridreg.eval.report import formats, line_styles, orbit_view, page, plotly_figures
+from hybridreg.eval.report.curve_panels import by_estimator
+from hybridreg.eval.report.laid_out import thinned
+from hybridreg.eval.report.line_styles import styles
 from hybridreg.eval.report.table_columns import Cells, number
 from hybridreg.eval.run.attempt import one_line
 from hybridreg.eval.run.row import Row
 from hybridreg.eval.score import errors
 from hybridreg.eval.score.protocols import Protocol
 from hybridreg.eval.score.scoring import identity
-from hybridreg.eval.scored_table import Entry, Table
+from hybridreg.eval.scored_table import IDENTITY, Entry, Table
+from hybridreg.frames import lower_pose
+from hybridreg.geometry import se3
 from hybridreg.io import write_text
-from hybridreg.pair import LabelledPair
+from hybridreg.pair import LabelledPair, Pair
 from hybridreg.runtime import optional_packages
 
-# A browser keeps about sixteen 3D views alive; half of that leaves room for another page.
 _MOST_VIEWS = 8
+# Points of a cloud in a view: eight of them take a megabyte.
+_DRAWN = 6000
 
 
 def write(
@@ -86,28 +93,53 @@ def html(table: Table, protocols: Sequence[Protocol], pairs: Sequence[LabelledPa
     body += [page.heading("Every pair"), page.paragraph(f"By protocol {protocols[0].name}.")]
     lines = [line for entry in table.methods for line in _pair_lines(entry, protocols[0])]
     if lines:
-        body.append(page.filterable(lines, success="success", text_from="verdict"))
+        body.append(page.filterable(lines, success="success", text_from="why"))
     body += [page.heading("The worst pairs"), *_views(table, protocols[0], pairs)]
     body.append(page.heading("Settings"))
     for entry in table.methods:
-        body += [page.heading(entry.name, 3), page.code(entry.config)]
+        body.append(page.folded(entry.name, page.code(entry.config)))
     body += [page.paragraph(remark) for remark in table.remarks()]
-    return page.page(table.title, body)
+    body.append(orbit_view.script())
+    return page.page(table.title, body, f"<script>{plotly_figures.script()}</script>")
 
 
 def _protocol_part(table: Table, protocol: Protocol) -> Iterator[str]:
-    rows = {entry.name: entry.rows for entry in table.entries if entry.rows}
     yield page.heading(f"Protocol {protocol.name}")
     yield page.paragraph(f"{table.caption(protocol)} ({protocol.source}).")
     for title, lines in formats.tables(table, protocol).items():
         if lines:
             yield page.heading(title, 3)
             yield page.html_table(lines)
-    plots = plotly_figures.recall_curves(rows, protocol)
-    judged = {name: each for name, each in rows.items() if any(row.confidence is not None for row in each)}
+    yield page.heading("As papers print it", 3)
+    yield page.html_table(formats.printed(table, protocol))
+    yield page.folded("The same in LaTeX", page.verbatim(formats.latex(table, [protocol])))
+    yield from _curves(table, protocol)
+
+
+def _curves(table: Table, protocol: Protocol) -> Iterator[str]:
+    entries = [entry for entry in table.entries if entry.rows]
+    looks = styles([entry.name for entry in entries])
+    yield page.heading("Recall as a threshold moves, and the confidence", 3)
+    yield line_styles.legend(looks)
+    base = [entry for entry in entries if entry.name == IDENTITY]
+    panels = by_estimator([entry for entry in entries if entry.name != IDENTITY]) or {"no method": []}
+    for estimator, members in panels.items():
+        rows = {entry.name: entry.rows for entry in [*base, *members]}
+        yield page.heading(f"Estimator: {estimator}", 4)
+        yield _side_by_side(plotly_figures.recall_curves(rows, looks, protocol))
+    judged = {
+        entry.name: entry.rows for entry in entries if any(row.confidence is not None for row in entry.rows)
+    }
     if judged:
-        plots += [plotly_figures.reliability(judged, protocol), plotly_figures.confidence(judged, protocol)]
-    yield f'<div class="curves">{"".join(f"<div>{plotly_figures.to_html(plot)}</div>" for plot in plots)}</div>'
+        yield page.heading("Confidence of all methods", 4)
+        plots = [plotly_figures.reliability(judged, looks, protocol)]
+        yield _side_by_side([*plots, plotly_figures.confidence(judged, looks, protocol)])
+
+
+def _side_by_side(plots: Sequence[Any]) -> str:
+    return (
+        f'<div class="curves">{"".join(f"<div>{plotly_figures.to_html(plot)}</div>" for plot in plots)}</div>'
+    )
 
 
 def _pair_lines(entry: Entry, protocol: Protocol) -> Iterator[Cells]:
@@ -132,10 +164,9 @@ def _views(table: Table, protocol: Protocol, pairs: Sequence[LabelledPair] | Non
         yield page.paragraph("The data was not at hand when this page was written, so there are no views.")
         return
     ids = ids_of(pairs)
-    for name, row in worst(table, protocol):
+    for number_of, (name, row) in enumerate(worst(table, protocol)):
         if row.id not in ids or row.T_true is None:
             continue
-        found = np.eye(4) if row.T is None else np.array(row.T)
         yield page.heading(f"{row.id}, {name}", 3)
         yield page.paragraph(_told(row))
         try:
@@ -143,9 +174,21 @@ def _views(table: Table, protocol: Protocol, pairs: Sequence[LabelledPair] | Non
         except (OSError, ValueError) as error:  # data that was damaged since must not prevent the report
             yield page.paragraph(f"There is no view: {one_line(error)}")
             continue
-        yield plotly_figures.to_html(
-            plotly_figures.clouds(pair.source.points, pair.target.points, found, np.array(row.T_true))
-        )
+        yield orbit_view.html(_layers(pair, row), f"view-{number_of}")
+
+
+def _layers(pair: Pair, row: Row) -> list[orbit_view.Layer]:
+    # Without a pose as it came, in the small coordinates that both clouds are drawn in.
+    found = np.eye(4) if row.T is None else lower_pose(np.array(row.T), pair)
+    truth = lower_pose(np.array(row.T_true), pair)
+    source, target = (thinned(cloud.points, _DRAWN) for cloud in (pair.source, pair.target))
+    layer = orbit_view.Layer
+    return [
+        layer("target", target, "#8f99a8"),
+        layer("source, aligned", se3.apply(found, source), "#d95f02"),
+        layer("source, true pose", se3.apply(truth, source), "#1b9e77"),
+        layer("source, before", source, "#a6761d", shown=False),
+    ]
 
 
 def worst(table: Table, protocol: Protocol) -> list[tuple[str, Row]]:

@@ -21,6 +21,7 @@ from hybridreg.cli import (
     simulate,
     table,
     train,
+    view,
 )
 
 app = typer.Typer(
@@ -49,6 +50,7 @@ def _common(
 
 app.command("register")(register.command)
 app.command("batch")(batch.command)
+app.command("view")(view.command)
 app.command("eval")(evaluate.command)
 app.command("table")(table.command)
 app.command("report")(report.command)

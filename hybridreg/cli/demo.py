@@ -12,10 +12,12 @@ import typer
 from hybridreg.cli import options
 from hybridreg.cli.register import show
 from hybridreg.cli.terminal.error_messages import VERDICT_FAILED, plainly
+from hybridreg.cli.terminal.typed_command import typed
 
 
 @plainly
 def command(
+    context: typer.Context,
     out: Annotated[Path, typer.Option(help="Folder for the pair, pose, result, page and picture.")] = Path(
         "out/demo"
     ),
@@ -42,7 +44,8 @@ def command(
     rre = metrics.rre_deg(result.transformation, labelled.T_target_source)
     rte = metrics.rte_m(result.transformation, labelled.T_target_source)
     print(f"against the true pose: {rre:.2f} deg, {rte:.2f} m")
-    written = single_report.write(pair, result, out)
+    origin = single_report.Origin("fan.ply", "rings.ply", command=typed(context))
+    written = single_report.write(pair, result, out, origin)
     for name, cloud in (("fan.ply", pair.source), ("rings.ply", pair.target)):
         write_points(out / name, cloud.points + cloud.offset)
         written.append(out / name)

@@ -135,6 +135,18 @@ def selections(
     return told
 
 
+def both(text: str | None, option: str) -> tuple[str, str]:
+    """One text for the source and one for the target, with a comma between; empty where nothing was given."""
+    if text is None:
+        return "", ""
+    source, comma, target = text.partition(",")
+    if not comma or "," in target:
+        raise ValueError(
+            f"{option} {text}: give two names with one comma, such as {option} 'Livox Avia,HDL-64E'"
+        )
+    return source.strip(), target.strip()
+
+
 def viewpoint(text: str, option: str) -> Any:
     """The viewpoint for `PointCloud.of` from `x,y,z`, `none` or `auto`."""
     if text in ("auto", "none"):

@@ -12,6 +12,7 @@ import typer
 from hybridreg.cli import options
 from hybridreg.cli.terminal.command_line_cures import spoken
 from hybridreg.cli.terminal.error_messages import VERDICT_FAILED, plainly
+from hybridreg.cli.terminal.typed_command import typed
 
 if TYPE_CHECKING:
     from hybridreg.cloud import PointCloud
@@ -27,6 +28,7 @@ class NonFinite(str, Enum):
 
 @plainly
 def command(
+    context: typer.Context,
     source: Annotated[Path, typer.Argument(help="The cloud that moves: ply, pcd, npy, las, e57, a bag ...")],
     target: Annotated[Path, typer.Argument(help="The cloud that stays.")],
     image: Annotated[Path | None, typer.Option(help="A camera image of the common view.")] = None,
@@ -35,7 +37,10 @@ def command(
     settings: options.Settings = None,
     voxel: options.Voxel = None,
     seed: options.Seed = 0,
-    out: Annotated[Path | None, typer.Option(help="Folder for pose, result, page and picture.")] = None,
+    out: Annotated[Path | None, typer.Option(help="Folder for pose, result, report and picture.")] = None,
+    sensors: Annotated[
+        str | None, typer.Option(metavar="NAME,NAME", help="The source's and the target's, for the report.")
+    ] = None,
     aligned: Annotated[
         Path | None, typer.Option(help="Write the source, moved onto the target: ply or pcd.")
     ] = None,
@@ -69,6 +74,7 @@ def command(
     for path in (aligned, merged):
         if path is not None and path.suffix.lower() not in (".ply", ".pcd"):
             raise ValueError(f"{path}: clouds are written as .ply or .pcd; choose such a name")
+    source_sensor, target_sensor = options.both(sensors, "--sensors")
     changes = options.changes_of(preset, pipeline, settings, voxel)
     known = options.prior(init, max_translation, max_rotation, gravity, crop, crop_source, scale)
     if known:
@@ -95,7 +101,8 @@ def command(
     if out is not None:
         from hybridreg.eval.report import single_report
 
-        files = single_report.write(pair, result, out)
+        origin = single_report.Origin(str(source), str(target), source_sensor, target_sensor, typed(context))
+        files = single_report.write(pair, result, out, origin)
         print(f"written to {out}: {', '.join(file.name for file in files)}")
     if result.verdict == "failed":
         raise typer.Exit(VERDICT_FAILED)

@@ -100,7 +100,7 @@ def test_out_gets_pose_result_page_and_picture_even_when_it_failed(
 ) -> None:
     verdict("failed")
     out = tmp_path / "deep" / "run"
-    result = call("register", *clouds, *SMALL, "--out", out, "--seed", "9")
+    result = call("register", *clouds, *SMALL, "--out", out, "--seed", "9", "--sensors", "Avia,HDL <64E>")
     assert result.exit_code == 3
     assert sorted(f.name for f in out.iterdir()) == [
         "T_target_source.txt", "before_after.png", "report.html", "result.json",
@@ -110,9 +110,17 @@ def test_out_gets_pose_result_page_and_picture_even_when_it_failed(
     assert (stored["verdict"], stored["seed"], stored["spec"]["refine"]["stage"]) == ("failed", 9, "icp")
     page = (out / "report.html").read_text()
     assert "Registration: failed" in page
-    assert "because." in page
-    assert page.count("Plotly.newPlot(") == 1
+    assert "<li>because</li>" in page
+    assert page.count('class="orbit"') == 1
+    assert "a.npy onto b.xyz" in page
+    assert "HDL &lt;64E&gt;" in page
+    assert f"--out {out} --sensors" in page
     assert (out / "before_after.png").read_bytes().startswith(b"\x89PNG")
+
+
+@pytest.mark.parametrize("names", ["Avia", "a,b,c", ""])
+def test_sensors_are_two_names(clouds: tuple[str, str], names: str) -> None:
+    assert "one comma" in refused(call("register", *clouds, *SMALL, "--sensors", names))
 
 
 @pytest.mark.usefixtures("verdict")

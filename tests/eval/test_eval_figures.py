@@ -4,6 +4,8 @@
 from __future__ import annotations
 
 import csv
+import json
+import re
 from pathlib import Path
 
 import cv2
@@ -14,7 +16,7 @@ from eval_stubs import Moody, Scattered, row
 import hybridreg as hr
 from hybridreg.cli import main
 from hybridreg.eval import PROTOCOLS, table_run
-from hybridreg.eval.report import curve_panels, figure_choice, registration_grid, rerun_grid
+from hybridreg.eval.report import curve_panels, figure_choice, registration_grid, rerun_grid, table_report
 from hybridreg.eval.run.controls import Control
 from hybridreg.eval.scored_table import Entry, Table
 from hybridreg.eval.table_file import Line, Recipe
@@ -143,3 +145,31 @@ def test_one_command_each(
         assert not left.value.code
     assert f"{kind}.png" in capsys.readouterr().out
     assert (run / "figures" / f"{kind}.pdf").is_file()
+
+
+def test_poses_between_map_coordinates_are_drawn_where_the_clouds_are(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    far = Scattered(1, offset=500_000.0)
+    truth = far[0].T_target_source
+    one = row(0, 0.0, 0.0, id="pair-0", T=truth.tolist(), T_true=truth.tolist())
+    lost = row(0, 0.0, 0.0, id="pair-0", T=None, T_true=truth.tolist())
+    entries = [Entry(name="right", rows=[one]), Entry(name="lost", rows=[lost])]
+
+    drawn: list[np.ndarray] = []
+    monkeypatch.setattr(registration_grid, "draw_clouds", lambda axes, source, *_: drawn.append(source))
+    registration_grid.write(tmp_path, entries, far, ["pair-0"], CROSS)
+    came, true, right, lost_at = drawn
+    assert np.allclose(right, true, atol=1e-6)
+    assert np.array_equal(lost_at, came)
+    assert np.abs(true).max() < 1e4
+
+    table = Table(title="t", data="d", seed=0, starts=0, entries=entries)
+    page = table_report.html(table, (CROSS,), far)
+    stored = re.findall(r'<script type="application/json">(.*?)</script>', page)
+    views = [{layer["name"]: layer for layer in json.loads(each)["layers"]} for each in stored]
+    assert len(views) == 2
+    lows = [{name: layer["low"] for name, layer in view.items()} for view in views]
+    assert any(np.allclose(each["source, aligned"], each["source, true pose"], atol=1e-3) for each in lows)
+    assert any(np.allclose(each["source, aligned"], each["source, before"], atol=1e-3) for each in lows)
+    assert all(np.abs(low).max() < 1e4 for each in lows for low in each.values())

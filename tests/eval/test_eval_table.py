@@ -4,6 +4,7 @@ from __future__ import annotations
 import csv
 import dataclasses
 import io
+import itertools
 import json
 import re
 from html.parser import HTMLParser
@@ -16,12 +17,12 @@ from eval_stubs import Moody, RowByRow, Scattered, row
 
 from hybridreg.eval import PROTOCOLS, read, table_run
 from hybridreg.eval.report import formats, plotly_figures, table_report
+from hybridreg.eval.report.line_styles import styles
 from hybridreg.eval.run.row import Row
 from hybridreg.eval.scored_table import Entry, Table
 from hybridreg.eval.table_file import Line, Recipe
 
 CROSS, KITTI, PREDATOR = (PROTOCOLS[name] for name in ("cross3dreg", "kitti", "predator"))
-THREE_D = '"hoverinfo":"skip"'
 RECIPE = Recipe(
     title="Stubs & friends",
     protocols=(CROSS, KITTI),
@@ -221,8 +222,13 @@ def test_the_page_is_whole_and_fetches_nothing(written: Path) -> None:
 def test_the_page_holds_plotly_once_curves_and_views(written: Path) -> None:
     text = (written / "report.html").read_text()
     assert text.count("plotly.js v") == 1
-    assert text.count("Plotly.newPlot(") == 2 * 4 + 8
-    assert text.count(THREE_D) == 8 * 4, "each view: target, aligned, before, true"
+    # Of each protocol: two curves for each of two estimators, and two pictures of the confidence.
+    assert text.count("Plotly.newPlot(") == 2 * (2 * 2 + 2)
+    views = [json.loads(each) for each in re.findall(r'<script type="application/json">(.*?)</script>', text)]
+    assert len(views) == 8
+    names = ["target", "source, aligned", "source, true pose", "source, before"]
+    assert all([layer["name"] for layer in view["layers"]] == names for view in views)
+    assert all(layer["shown"] for view in views for layer in view["layers"][:3]), "the truth is seen at once"
     outside = text.replace(plotly_figures.script(), "")
     assert set(re.findall(r"https?://[^\"' ]*", outside)) <= {"https://plot.ly"}, (
         "only plotly's own setting, unused"
@@ -257,7 +263,7 @@ def test_worst_pairs_take_turns_and_start_with_the_largest_error() -> None:
 def test_without_data_the_page_says_so(ran: tuple[Table, Path]) -> None:
     text = table_report.html(ran[0], (CROSS,))
     assert "no views" in text
-    assert THREE_D not in text
+    assert 'class="orbit"' not in text
 
 
 @pytest.mark.parametrize("text", ["</script><b>x</b>", "${title} $body", "`${1}`"])
@@ -278,3 +284,30 @@ def test_scoring_again_needs_only_the_file(ran: tuple[Table, Path]) -> None:
         name: table_run.load(out).scores(p)["exact"].recall for name, p in PROTOCOLS.items()
     }
     assert again == dict.fromkeys(PROTOCOLS, 1.0)
+
+
+def test_the_page_has_one_legend_beside_its_curves_and_tables_to_sort(written: Path) -> None:
+    text = (written / "report.html").read_text()
+    assert text.count('class="legend"') == len(RECIPE.protocols)
+    for legend in re.findall(r'<div class="legend">.*?</div>', text):
+        assert re.findall(r'data-trace="([^"]*)"', legend) == ["identity", "exact", "moody_&lt;b&gt;"]
+    outside = text.replace(plotly_figures.script(), "")
+    assert '"showlegend":true' not in outside
+    assert outside.count('"showlegend":false') == outside.count("Plotly.newPlot(")
+    assert text.count('<table class="sortable">') >= 3 * len(RECIPE.protocols)
+
+
+def test_the_page_prints_tables_as_papers_do_and_hands_out_the_latex(written: Path) -> None:
+    text = (written / "report.html").read_text()
+    assert text.count("As papers print it") == len(RECIPE.protocols)
+    for head in ("RRE (°)", "RTE (m)", "RR (%)", "IR (%)"):
+        assert f'<th class="sorts">{head}</th>' in text
+    assert text.count("\\begin{tabular}{lrrrr}") == len(RECIPE.protocols)
+    assert "@media print" in text
+
+
+def test_neighbouring_methods_look_different_and_keep_their_look() -> None:
+    names = [f"m{k}" for k in range(20)]
+    looks = styles(names)
+    assert len({(look.colour, look.svg) for look in looks.values()}) == 20
+    assert all(a.colour != b.colour and a.svg != b.svg for a, b in itertools.pairwise(looks.values()))

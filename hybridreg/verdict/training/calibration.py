@@ -74,7 +74,7 @@ def draw(p: Array, right: NDArray[np.bool_], path: Path) -> None:
         axes.annotate(f"{hits}/{n}", (at, share), xytext=(7, -4), textcoords="offset points", fontsize=8)
     axes.axvline(OK, color="tab:green", linestyle=":", linewidth=1)
     axes.text(OK - 0.01, 0.02, '"ok"', ha="right", color="tab:green", fontsize=8)
-    axes.set(xlabel="confidence", ylabel="share of right poses", xlim=(-0.03, 1.12), ylim=(-0.03, 1.05))
+    axes.set(xlabel="confidence", ylabel="share of right poses", xlim=(-0.03, 1.2), ylim=(-0.03, 1.05))
     figure.tight_layout()
     figure.savefig(path, dpi=110)
     plt.close(figure)

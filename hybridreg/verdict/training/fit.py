@@ -4,11 +4,13 @@
     python -m hybridreg.verdict.training gather --rows runs/evidence.jsonl --pairs 40
     python -m hybridreg.verdict.training fit --rows runs/evidence.jsonl --write hybridreg/verdict
     python -m hybridreg.verdict.training continue --rows runs/evidence.jsonl --write hybridreg/verdict
+    python -m hybridreg.verdict.training usual --rows runs/evidence.jsonl --write hybridreg/verdict
 
 `gather` writes one line for each answer (`hybridreg.verdict.training.answers`): its evidence, that of its best
 rival, that of all poses that were found, and what is right. `fit` prints how the rules do on pairs that they were not
 fitted to (five-fold), and writes them. `continue` leaves the support and the trees as they are and adds trees for what
-these answers say beside: new kinds of input, new evidence.
+these answers say beside: new kinds of input, new evidence. `usual` writes the range that each number of right poses
+has, which reports show (`hybridreg.verdict.training.usual_range`).
 """
 
 from __future__ import annotations
@@ -26,11 +28,13 @@ from numpy.typing import NDArray
 
 from hybridreg.evidence.evidence import NO_RIVAL, Evidence
 from hybridreg.evidence.log_odds import OK, model, terms
+from hybridreg.io import write_json
 from hybridreg.verdict.boosted import Boosted
 from hybridreg.verdict.confidence import confidence, features
 from hybridreg.verdict.training.answers import TIERS, Row, gather, read
 from hybridreg.verdict.training.boosting import boost, continued, plain
 from hybridreg.verdict.training.calibration import draw
+from hybridreg.verdict.training.usual_range import ranges
 
 Array = NDArray[np.float64]
 # Penalty on the squared weights of the standardised terms, per answer.
@@ -143,7 +147,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("what", choices=["gather", "fit", "continue"])
+    parser.add_argument("what", choices=["gather", "fit", "continue", "usual"])
     parser.add_argument("--rows", type=Path, default=Path("runs/evidence.jsonl"))
     parser.add_argument("--pairs", type=int, default=40, help="of each tier")
     parser.add_argument("--workers", type=int, default=2)
@@ -154,6 +158,12 @@ def main() -> None:
         gather(options.rows, options.pairs, options.workers)
         return
     rows = read(options.rows)
+    if options.what == "usual":
+        found = ranges(rows)
+        print(json.dumps(found["facts"], indent=2))
+        if options.write:
+            write_json(options.write / "usual.json", found)
+        return
     fitted = longer if options.what == "continue" else fit
     p = unseen(rows, fitted)
     report(rows, p)
