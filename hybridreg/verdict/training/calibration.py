@@ -35,7 +35,7 @@ def outcomes(folder: Path) -> tuple[Array, NDArray[np.bool_]]:
 
 def answered(folder: Path) -> list[Row]:
     """The runs in a folder that have a verdict."""
-    rows = [row for file in sorted((folder / "predictions").glob("*")) for row in store.read(file).rows]
+    rows = [row for file in sorted((folder / "predictions").glob("*.jsonl")) for row in store.read(file).rows]
     return [row for row in rows if row.confidence is not None]
 
 
