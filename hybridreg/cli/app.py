@@ -20,6 +20,7 @@ from hybridreg.cli import (
     report,
     simulate,
     table,
+    together,
     train,
 )
 
@@ -49,6 +50,7 @@ def _common(
 
 app.command("register")(register.command)
 app.command("batch")(batch.command)
+app.command("together")(together.command)
 app.command("eval")(evaluate.command)
 app.command("table")(table.command)
 app.command("report")(report.command)
