@@ -6,7 +6,7 @@ from __future__ import annotations
 import os
 import zlib
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -60,7 +60,8 @@ class Pipeline(Stage):
         Stages that do not fit together; the message names one that would.
     """
 
-    voxel: float | None = None
+    # What it says stands in `downsample`, so that a pipeline equals the one that its file gives.
+    voxel: float | None = field(default=None, compare=False)
     downsample: Any = "voxel"
     overlap: Any = "none"
     match: Any = "fpfh"
