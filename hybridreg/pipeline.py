@@ -109,12 +109,19 @@ class Pipeline(Stage):
         return slots if self.prior is None else {**slots, "prior": self.prior.to_table()}
 
     def swap(self, **stages: Any) -> Pipeline:
-        """A copy with some slots filled anew: `pipe.swap(estimate="ransac")`."""
+        """A copy with some slots filled anew: `pipe.swap(estimate="ransac")`.
+
+        An estimate stage that is kept and named the weights of the match stage names those of the new one.
+        """
         unknown = set(stages) - {*SLOTS, "voxel", "prior"}
         if unknown:
             raise TypeError(
                 f"no slot is called {', '.join(sorted(unknown))}; the slots are {', '.join(SLOTS)}"
             )
+        if "match" in stages and "estimate" not in stages:
+            given = stages["match"]
+            stages["match"] = spec.from_table(given, "match") if isinstance(given, (str, Mapping)) else given
+            stages["estimate"] = fitting.following(self.match, stages["match"], self.estimate)
         if "downsample" in stages:
             stages.setdefault("voxel", None)
         elif stages.get("voxel") is not None:
