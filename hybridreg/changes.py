@@ -55,6 +55,10 @@ def build(changes: Mapping[str, Any]) -> Pipeline:
 
 def apply(pipeline: Pipeline, changes: Mapping[str, Any]) -> Pipeline:
     """The pipeline with other stages in some slots, or other fields of a slot's stage."""
+    estimate = changes.get("estimate")
+    if "match" in changes and isinstance(estimate, Mapping) and not {"stage", "weights"} & set(estimate):
+        # First alone, so that the estimate's weights follow it; then the estimate's other fields.
+        pipeline = apply(pipeline, {"match": changes["match"]})
     slots: dict[str, Any] = {}
     for slot, change in changes.items():
         if slot == "prior":

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+import os
 import types
 import warnings
 from numbers import Integral, Real
@@ -46,6 +47,20 @@ def with_voxel(downsample: Any, voxel: float | None) -> Any:
     if downsample.voxel is not None:
         raise ValueError(f"voxel={voxel} contradicts the downsampling stage's own voxel={downsample.voxel}")
     return dataclasses.replace(downsample, voxel=voxel)
+
+
+def following(before: Any, after: Any, estimate: Any) -> Any:
+    """The estimate stage with the weights of a match stage that takes another's place.
+
+    `Lgr` takes its numbers from the configuration of the network whose matches it gets. Where it named the same weights
+    as the match stage before, it names those of the match stage after, too; none where these are a published
+    checkpoint, a file without such a configuration, for which its own defaults are meant.
+    """
+    named, now = getattr(before, "weights", None), getattr(after, "weights", None)
+    own = getattr(estimate, "weights", None)
+    if own is None or own != named or now == named or not hasattr(after, "weights"):
+        return estimate
+    return dataclasses.replace(estimate, weights=None if now is None or os.path.isfile(now) else now)
 
 
 def check(pipeline: Pipeline) -> None:

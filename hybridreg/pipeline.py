@@ -6,7 +6,7 @@ from __future__ import annotations
 import os
 import zlib
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -60,7 +60,8 @@ class Pipeline(Stage):
         Stages that do not fit together; the message names one that would.
     """
 
-    voxel: float | None = None
+    # What it says stands in `downsample`, so that a pipeline equals the one that its file gives.
+    voxel: float | None = field(default=None, compare=False)
     downsample: Any = "voxel"
     overlap: Any = "none"
     match: Any = "fpfh"
@@ -108,12 +109,19 @@ class Pipeline(Stage):
         return slots if self.prior is None else {**slots, "prior": self.prior.to_table()}
 
     def swap(self, **stages: Any) -> Pipeline:
-        """A copy with some slots filled anew: `pipe.swap(estimate="ransac")`."""
+        """A copy with some slots filled anew: `pipe.swap(estimate="ransac")`.
+
+        An estimate stage that is kept and named the weights of the match stage names those of the new one.
+        """
         unknown = set(stages) - {*SLOTS, "voxel", "prior"}
         if unknown:
             raise TypeError(
                 f"no slot is called {', '.join(sorted(unknown))}; the slots are {', '.join(SLOTS)}"
             )
+        if "match" in stages and "estimate" not in stages:
+            given = stages["match"]
+            stages["match"] = spec.from_table(given, "match") if isinstance(given, (str, Mapping)) else given
+            stages["estimate"] = fitting.following(self.match, stages["match"], self.estimate)
         if "downsample" in stages:
             stages.setdefault("voxel", None)
         elif stages.get("voxel") is not None:

@@ -65,15 +65,6 @@ def test_trimesh_reads_the_angles_of_urdf(T: np.ndarray) -> None:
     np.testing.assert_allclose(M[:3, :3], T[:3, :3], atol=1e-9)
 
 
-@pytest.mark.parametrize("T", POSES)
-def test_evo_reads_trajectories(T: np.ndarray, tmp_path: Path) -> None:
-    evo = pytest.importorskip("evo.tools.file_interface")
-    for form in ("kitti", "tum"):
-        (tmp_path / form).write_text(pose_text.pose_text(T, form) + "\n")
-    np.testing.assert_allclose(evo.read_kitti_poses_file(tmp_path / "kitti").poses_se3[0], T)
-    np.testing.assert_allclose(evo.read_tum_trajectory_file(tmp_path / "tum").poses_se3[0], T, atol=1e-9)
-
-
 def test_an_unknown_format_lists_the_known() -> None:
     with pytest.raises(ValueError, match="format='euler': a pose is written as matrix, quaternion, ros-tf"):
         pose_text.pose_text(np.eye(4), "euler")
@@ -160,36 +151,3 @@ def test_the_command_line_writes_clouds(tmp_path: Path, ending: str) -> None:
         done = CliRunner().invoke(app, [*call, *wrong])
         assert done.exit_code == 2
         assert wrong[1] in done.stderr
-
-
-@pytest.mark.parametrize("ending", ["ply", "pcd"])
-def test_pcl_and_open3d_read_what_is_written(result: Any, tmp_path: Path, ending: str) -> None:
-    found, pair, _ = result
-    path = tmp_path / f"a.{ending}"
-    moved = found.apply(pair.source)
-    write_points(path, moved)
-    read = []
-    try:
-        from hybridreg.runtime.open3d import load_open3d
-
-        read.append(np.asarray(load_open3d().io.read_point_cloud(str(path)).points))
-    except ImportError:
-        pass
-    if ending == "pcd":
-        try:
-            from pypcd4 import PointCloud
-
-            read.append(PointCloud.from_path(path).numpy(("x", "y", "z")))
-        except ImportError:
-            pass
-    else:
-        try:
-            import trimesh
-
-            read.append(np.asarray(trimesh.load(path).vertices))
-        except ImportError:
-            pass
-    if not read:
-        pytest.skip("none of them is here")
-    for each in read:
-        np.testing.assert_allclose(each, moved, atol=1e-4)

@@ -274,8 +274,33 @@ def test_a_degenerate_voxel_count_is_a_warning_with_numbers(courtyard: tuple[hr.
 def test_save_and_load(tmp_path: Path) -> None:
     pipe = hr.Pipeline(voxel=0.3, refine=hr.Gicp(max_distances=(2.0, 1.0), iterations=7))
     pipe.save(tmp_path / "mine.toml")
-    assert hr.Pipeline.load(tmp_path / "mine.toml") == pipe.swap(voxel=None, downsample=pipe.downsample)
+    assert hr.Pipeline.load(tmp_path / "mine.toml") == pipe
     assert [p.name for p in tmp_path.iterdir()] == ["mine.toml"]
+
+
+@pytest.mark.parametrize("make", [
+    lambda: hr.Pipeline.preset("fpfh-ransac-gicp", voxel=0.3),
+    lambda: hr.Pipeline.preset("fpfh-ransac-gicp").swap(voxel=0.3),
+    lambda: hr.Pipeline(voxel=np.float32(0.5)),
+    lambda: hr.Pipeline(voxel=1),
+    lambda: hr.Pipeline.preset("default", voxel=0.4),
+    lambda: hr.Pipeline.preset("default"),
+    lambda: hr.Pipeline(voxel=0.3, prior={"init": np.eye(4), "gravity": (0, 1, 0), "crop": 30.0}),
+    lambda: hr.Pipeline(match="none", estimate=hr.Candidates(of=[{"estimate": "birdseye"}]), refine="none"),
+])  # fmt: skip
+def test_a_saved_pipeline_is_the_one_that_was_saved(make: Any, tmp_path: Path) -> None:
+    pipe = make()
+    pipe.save(tmp_path / "mine.toml")
+    again = hr.Pipeline.load(tmp_path / "mine.toml")
+    assert again == pipe
+    assert pipe == again
+    assert again.to_spec() == pipe.to_spec()
+    assert pipe != pipe.swap(voxel=0.77)
+    assert again.swap(refine="none") == pipe.swap(refine="none")
+
+
+def test_equal_pipelines_have_one_hash() -> None:
+    assert hash(hr.Pipeline(voxel=0.3)) == hash(hr.Pipeline(downsample=hr.VoxelGrid(voxel=0.3)))
 
 
 @pytest.mark.parametrize(

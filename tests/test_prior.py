@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -70,6 +71,60 @@ def test_a_pose_beyond_the_bounds_is_none(demo: Any, bound: dict[str, float], wo
             if "max_rotation" in bound
         )
     assert any(word in reason for reason in result.reasons), result.reasons
+
+
+@pytest.mark.parametrize("preset", ["default", "birdseye-gicp"])
+@pytest.mark.parametrize("shift, degrees, bound, away", [
+    (0.0, 4.0, 0.3, (0.9, 1.4)),  # a tilted start: its translation is exact
+    (500.0, 2.0, 3.0, (17.0, 19.0)),  # the same of a source whose origin lies far away
+    (0.0, 0.0, 5.0, (6.7, 7.1)),  # no start at all
+])  # fmt: skip
+def test_a_pose_that_was_shut_out_is_told_with_its_distance_and_how_it_is_measured(
+    demo: Any, preset: str, shift: float, degrees: float, bound: float, away: tuple[float, float]
+) -> None:
+    source, target, truth = demo
+    offset = np.array([shift, 0.0, 0.0])
+    T = truth @ se3.from_rt(np.eye(3), -offset)
+    tilt = se3.from_rt(se3.rotation_about(np.radians([0.0, degrees, 0.0])), np.zeros(3))
+    init = {"init": T @ tilt} if degrees else {}
+    result = hr.register(source + offset, target, preset=preset, max_translation=bound, **init)
+    assert result.verdict == "failed"
+    told = re.search(
+        rf"lies ([\d.]+) m from the start, beyond max_translation={bound:g} \(measured at the middle of the "
+        r"source, ([\d.]+) m from its origin: a start that is turned by 1 degree lies ([\d.]+) m off there\)",
+        " ".join(result.reasons),
+    )
+    assert told, result.reasons
+    moved, arm, each = map(float, told.groups())
+    assert away[0] < moved < away[1]
+    middle = np.linalg.norm(np.median(source, axis=0) + offset)
+    assert arm == pytest.approx(middle, abs=0.6)
+    assert each == pytest.approx(np.radians(arm), rel=0.06)
+    if preset == "default" and degrees:
+        assert any("shut out" in reason for reason in result.reasons)
+    lost = [reason for reason in result.reasons if reason.startswith("no pose")]
+    assert lost in ([], ["no pose is left: the start was returned"])
+    freed = hr.register(source + offset, target, preset=preset, max_translation=away[1] * 1.2, **init)
+    assert near(freed.transformation @ se3.from_rt(np.eye(3), offset), truth), freed.reasons
+
+
+@pytest.mark.parametrize("bound, word", [
+    ({"max_rotation": 3.0}, "degrees from the start, beyond max_rotation=3"),
+    ({"gravity": ((0, 0, 1), (0, 0.5, 1))}, "with both verticals"),
+])  # fmt: skip
+def test_other_bounds_tell_what_they_shut_out(demo: Any, bound: dict[str, Any], word: str) -> None:
+    source, target, truth = demo
+    turned = se3.from_rt(se3.yaw(8.0)[:3, :3], np.zeros(3))
+    result = hr.register(source, target, init=truth @ turned, **bound)
+    assert result.verdict == "failed"
+    assert any("shut out" in reason and word in reason for reason in result.reasons), result.reasons
+
+
+def test_what_lies_within_the_bounds_is_told_nothing_of_them(demo: Any) -> None:
+    source, target, truth = demo
+    result = hr.register(source, target, init=truth, max_translation=0.5, max_rotation=2.0)
+    assert result.verdict == "ok"
+    assert not any("shut out" in reason for reason in result.reasons)
 
 
 def test_bounds_leave_one_of_two_alike_poses() -> None:

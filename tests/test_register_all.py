@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,7 @@ import hybridreg as hr
 from hybridreg.data.hard import box_world
 from hybridreg.data.loaders.folder import load_pair
 from hybridreg.geometry import se3
+from hybridreg.many import link_search
 from hybridreg.many.links import Link, best_tree, groups, placed
 from hybridreg.runtime.open3d import load_open3d
 
@@ -130,12 +132,25 @@ def test_the_work_may_be_spread_over_dask() -> None:
     ({"known": {(1, 1): np.eye(4)}}, r"known: \(1, 1\)"),
     ({"known": {(0, 1): np.zeros((4, 4))}}, r"known\[0, 1\]"),
     ({"seed": -1}, "seed=-1"),
+    ({"pipeline": hr.Pipeline.preset("birdseye-gicp"), "voxel": 0.5}, "voxel=0.5 is a preset's"),
 ])  # fmt: skip
 def test_what_cannot_be_is_refused(wrong: dict[str, Any], word: str) -> None:
     rng = np.random.default_rng(0)
     arguments: dict[str, Any] = {"clouds": [rng.normal(size=(100, 3)) for _ in range(3)], **wrong}
     with pytest.raises(ValueError, match=word):
         hr.register_all(arguments.pop("clouds"), **arguments)
+
+
+def test_a_pipeline_of_ones_own_and_open3d_is_asked_for_before_the_work(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    scans, _ = tour(3, length=6.0)
+    own = hr.register_all(scans, pipeline=hr.Pipeline.preset("birdseye-gicp"))
+    np.testing.assert_array_equal(own.poses, hr.register_all(scans, preset="birdseye-gicp").poses)
+    monkeypatch.setitem(sys.modules, "open3d", None)
+    monkeypatch.setattr(link_search, "_linked", lambda *job: pytest.fail("nothing was to be registered"))
+    with pytest.raises(ImportError, match="open3d"):
+        hr.register_all(scans)
 
 
 def test_a_bad_cloud_is_told_by_its_name() -> None:

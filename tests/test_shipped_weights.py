@@ -3,13 +3,15 @@
 
 from __future__ import annotations
 
+import dataclasses
 from pathlib import Path
+from typing import Any
 
 import pytest
 from typer.testing import CliRunner
 
 import hybridreg as hr
-from hybridreg import changes, testing
+from hybridreg import changes, presets, testing
 from hybridreg.cli.app import app
 from hybridreg.io import shipped_weights
 
@@ -77,6 +79,49 @@ def test_own_weights_take_the_place_of_missing_ones(drop: Path, tmp_path: Path) 
     assert (built.overlap.weights, built.match.weights) == (own["weights"], own["weights"])
     with pytest.raises(shipped_weights.MissingWeights, match=r"--set overlap\.weights=FOLDER$"):
         changes.build({"preset": "cross3dreg", "match": own, "estimate": own})
+
+
+@pytest.mark.parametrize("preset", ["cross3dreg", "cross3dreg-as-published", "geotransformer"])
+def test_the_estimate_takes_its_numbers_from_the_matches_own_network(
+    preset: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(shipped_weights, "require", lambda *_: None)  # only names are of interest here
+    mine = {"weights": str(tmp_path / "mine")}
+
+    def of(more: dict[str, Any]) -> Any:
+        return changes.build({"preset": preset, **more}).estimate
+
+    old = of({}).weights
+    assert old == changes.build({"preset": preset}).match.weights
+    assert of({"match": mine}).weights == mine["weights"]
+    assert of({"match": mine, "estimate": {"steps": 7}}).weights == mine["weights"]
+    assert of({"estimate": {"steps": 7}, "match": mine}).steps == 7
+    assert of({"match": mine, "estimate": {"weights": "other"}}).weights == "other"
+    assert of({"match": {"stage": "geotransformer", **mine}}).weights == mine["weights"]
+    assert of({"overlap": {"stage": "omp", **mine}}).weights == old
+    # Saved and merged settings, and objects in Python.
+    text = changes.merge({"preset": preset}, changes.parse([f"match.weights={mine['weights']}"]))
+    assert changes.build(text).estimate.weights == mine["weights"]
+    pipe = hr.Pipeline(**presets.load(preset))
+    match = dataclasses.replace(pipe.match, **mine)
+    assert pipe.swap(match=match).estimate.weights == mine["weights"]
+    assert pipe.swap(match=match, estimate=pipe.estimate).estimate.weights == old
+    assert pipe.swap(match=match).swap(voxel=0.3).estimate.weights == mine["weights"]
+    assert pipe.swap(match={"stage": "geotransformer", "untrained": True}).estimate.weights is None
+    (tmp_path / "published.pth.tar").write_bytes(b"")
+    assert of({"match": {"weights": str(tmp_path / "published.pth.tar")}}).weights is None
+    # What named other weights before keeps them.
+    other = pipe.swap(estimate=dataclasses.replace(pipe.estimate, weights="other"))
+    assert other.swap(match=match).estimate.weights == "other"
+    assert pipe.swap(refine="gicp").estimate.weights == old
+
+
+def test_own_weights_of_the_match_suffice_where_shipped_ones_are_missing(drop: Path, tmp_path: Path) -> None:
+    (drop / "geotransformer-small").rename(tmp_path / "mine")
+    built = changes.build({"preset": "geotransformer", "match": {"weights": str(tmp_path / "mine")}})
+    assert built.estimate.weights == str(tmp_path / "mine")
+    pair, _ = testing.sample_pair(n_points=600)
+    assert built.run(pair).transformation.shape == (4, 4)
 
 
 def test_half_a_folder_is_no_weights(package: Path) -> None:

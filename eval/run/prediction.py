@@ -11,7 +11,7 @@ from typing import Any
 
 from hybridreg import __version__
 from hybridreg.data import content
-from hybridreg.data.dataset import fingerprint_of, ids_of, looks_of
+from hybridreg.data.dataset import fingerprint_of, ids_of, looks_of, vouch
 from hybridreg.eval.run import truth
 from hybridreg.eval.run.attempt import Method, attempt, one_line
 from hybridreg.eval.run.controls import Control
@@ -61,13 +61,14 @@ def predict(
     ------
     ValueError
         The file was made by another configuration or version, of data or weights with another content; it is being
-        written by another process; or two pairs share an id.
+        written by another process; two pairs share an id; or the poses map target to source.
     ImportError
         A package that the method or the data need is not here; what was never run is not a failed row.
     OSError
         The file cannot be written.
     """
     ids = ids_of(pairs)
+    vouch(pairs)
     seen = looks_of(pairs)
     described = describe(method)
     weights = weights_of(described)

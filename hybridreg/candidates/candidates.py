@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybridreg import fitting, registry, spec
-from hybridreg.candidates import input_mistakes
+from hybridreg.candidates import input_mistakes, shut_out
 from hybridreg.evidence import match_agreement
 from hybridreg.evidence.log_odds import NEARLY, OK
 from hybridreg.evidence.pose_evidence import PoseEvidence
@@ -105,8 +105,9 @@ class Candidates(Stage):
     def __call__(self, scene: Scene, matches: Correspondences, rng: np.random.Generator) -> Pose:
         found: list[Hypothesis] = []
         traces: list[EntryTrace] = []
+        beyond: list[Hypothesis | Array] = []
         pose, confidence = Pose.unknown(len(matches)), 0.0
-        for every in self._worth_trying(scene).stages(scene, matches, rng, traces):
+        for every in self._worth_trying(scene).stages(scene, matches, rng, traces, beyond):
             found = [one for one in every if scene.pair.allows(one.T)]
             if not found:
                 continue
@@ -120,6 +121,7 @@ class Candidates(Stage):
                 break
         if confidence < _SURE:
             with scene.clock.phase("verdict"):
+                scene.explanations.extend(shut_out.explanations(scene, beyond, found))
                 scene.explanations.extend(input_mistakes.explanations(scene))
         won = found[0].came_from if found else None
         return replace(pose, entries=tuple(trace._replace(won=trace.entry == won) for trace in traces))
@@ -139,12 +141,14 @@ class Candidates(Stage):
         matches: Correspondences,
         rng: np.random.Generator,
         traces: list[EntryTrace] | None = None,
+        beyond: list[Hypothesis | Array] | None = None,
     ) -> Iterator[list[Hypothesis]]:
         """What is found after each entry, and after a second look at the end, the likeliest first.
 
-        What each entry did is appended to `traces`.
+        What each entry did is appended to `traces`, what it found outside the pair's bounds to `beyond`.
         """
         traces = [] if traces is None else traces
+        beyond = [] if beyond is None else beyond
         found: list[Hypothesis] = []
         offered: list[list[Hypothesis]] = []
         missing: list[str] = []
@@ -164,6 +168,7 @@ class Candidates(Stage):
             except (ValueError, OSError) as error:
                 pose, problem = Pose.unknown(), _left_out(entry, scene, error)
             if pose.found and np.isfinite(pose.T).all():
+                beyond.extend(shut_out.beyond(scene, pose))
                 here = [one.but(came_from=name) for one in best_first(scene, _starts(scene, pose))]
                 offered.append(here)
                 found = _polished(scene, counted(scene, self._joined(scene, found, here), offered))

@@ -20,6 +20,7 @@ from hybridreg.cli import (
     report,
     simulate,
     table,
+    together,
     train,
     view,
 )
@@ -51,6 +52,7 @@ def _common(
 app.command("register")(register.command)
 app.command("batch")(batch.command)
 app.command("view")(view.command)
+app.command("together")(together.command)
 app.command("eval")(evaluate.command)
 app.command("table")(table.command)
 app.command("report")(report.command)

@@ -26,6 +26,12 @@ _NEEDED = {
     "sklearn": ("scikit-learn", "fitting the confidence anew (extra `train`)"),
     "lightning_fabric": ("lightning-fabric", "training (extra `train`)"),
     "laspy": ("laspy", "las and laz files (extra `las`)"),
+    "rosbags": ("rosbags", "bags (extra `ros`)"),
+    "pye57": ("pye57", "e57 files (extra `e57`)"),
+    "pyarrow": ("pyarrow", "feather and parquet files (extra `arrow`)"),
+    "trimesh": ("trimesh", "obj, stl, off and glb files (extra `mesh`)"),
+    "vtkmodules.vtkIOXML": ("vtk", "vtp files (extra `vtk`)"),
+    "imagecodecs": ("imagecodecs", "compressed pcd files, a hundred times as fast (extra `pcd`)"),
     "distributed": ("distributed", "tables on a cluster (extra `cluster`)"),
 }
 

@@ -23,7 +23,7 @@ BUILT_IN = {
     "cross-lidar": "hybridreg.data.loaders.cross_lidar:CrossLidar.from_text",
     "cross3dreg": "hybridreg.data.loaders.cross3dreg:Cross3DReg.from_text",
     "dair-v2x": "hybridreg.data.loaders.dair_v2x:DairV2x.from_text",
-    "folder": "hybridreg.data.loaders.folder:PairFolder",
+    "folder": "hybridreg.data.loaders.folder:PairFolder.from_text",
     "helipr": "hybridreg.data.loaders.helipr:HeLiPr.from_text",
     "kitti": "hybridreg.data.loaders.kitti:Kitti.from_text",
     "pandaset": "hybridreg.data.loaders.pandaset:PandaSet.from_text",

@@ -12,14 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybridreg.data.lists import azimuth
-from hybridreg.data.lists.direction import Direction, overlap, spread
+from hybridreg.data.lists.direction import CURE, Direction, overlap, spread
 from hybridreg.data.lists.listed import ListedPairs
 from hybridreg.geometry import se3
 from hybridreg.pair import LabelledPair
 
 Array = NDArray[np.float64]
-
-_CURE = "invert them: they must map source points to target points"
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -72,7 +70,7 @@ def summarise(pairs: Sequence[LabelledPair], n: int = 50) -> Summary:
     motions = (
         [e.T_target_source for e in pairs.entries] if isinstance(pairs, ListedPairs) else [s.T for s in seen]
     )
-    given, inverted = np.array([[s.overlap, s.inverse_overlap] for s in seen]).T
+    both = [(s.overlap, s.inverse_overlap) for s in seen]
     return Summary(
         n_pairs=len(pairs),
         n_read=len(seen),
@@ -82,9 +80,9 @@ def summarise(pairs: Sequence[LabelledPair], n: int = 50) -> Summary:
         points={side: int(np.median([s.points[side] for s in seen])) for side in ("source", "target")},
         translation_m=np.array([np.linalg.norm(T[:3, 3]) for T in motions]),
         rotation_deg=np.array([se3.angle_deg(T[:3, :3]) for T in motions]),
-        overlaps=given,
-        direction=Direction(float(given.mean()), float(inverted.mean()), len(seen), radius),
-        cure=getattr(pairs, "if_inverted", "") or _CURE,
+        overlaps=np.array([given for given, _ in both]),
+        direction=Direction.of(both, radius),
+        cure=getattr(pairs, "if_inverted", "") or CURE,
     )
 
 

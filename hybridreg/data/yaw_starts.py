@@ -10,7 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from hybridreg.cloud import PointCloud
-from hybridreg.data.dataset import Dataset, fingerprint_of, ids_of, looks_of
+from hybridreg.data.dataset import Dataset, fingerprint_of, ids_of, looks_of, vouch
 from hybridreg.geometry import se3
 from hybridreg.pair import LabelledPair
 
@@ -45,6 +45,10 @@ class YawStarts(Dataset):
 
     def looks(self) -> str:
         return looks_of(self.pairs)
+
+    def vouch(self) -> None:
+        """As the pairs themselves do."""
+        vouch(self.pairs)
 
 
 def yaw_starts(pairs: Sequence[LabelledPair], n: int = 3, seed: int = 0) -> YawStarts:

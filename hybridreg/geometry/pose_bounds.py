@@ -30,6 +30,9 @@ class PoseBounds:
         Metres that it may lie away from there.
     max_rotation : float or None
         Degrees that the pose may turn away from the start.
+    arm : float
+        Metres from the origin of the source's own coordinates to its middle: as far as a start that is turned about
+        that origin moves the middle, for each radian.
     up_source, up_target : (3,) float64 or None
         Unit vectors along the vertical, one in each frame; a pose that does not bring them together within
         `MOST_TILT` degrees is none.
@@ -39,6 +42,7 @@ class PoseBounds:
     start: Array
     max_translation: float | None = None
     max_rotation: float | None = None
+    arm: float = 0.0
     up_source: Array | None = None
     up_target: Array | None = None
 
@@ -50,7 +54,11 @@ class PoseBounds:
         """What speaks against a pose (4, 4), in words; empty where it lies within all bounds."""
         moved = float(np.linalg.norm(se3.apply(T, self.centre[None])[0] - self.start))
         if self.max_translation is not None and not moved <= self.max_translation:
-            return f"{moved:.2f} m from the start, beyond max_translation={self.max_translation:g}"
+            return (
+                f"{moved:.2f} m from the start, beyond max_translation={self.max_translation:g} (measured at the "
+                f"middle of the source, {self.arm:.4g} m from its origin: a start that is turned by 1 degree lies "
+                f"{np.radians(self.arm):.2g} m off there)"
+            )
         turned = se3.angle_deg(T[:3, :3])
         if self.max_rotation is not None and not turned <= self.max_rotation:
             return f"{turned:.1f} degrees from the start, beyond max_rotation={self.max_rotation:g}"

@@ -25,15 +25,16 @@ from hybridreg.io.recorded.helipr_records import is_helipr, read_helipr
 from hybridreg.io.recorded.lvx2 import read_lvx2
 from hybridreg.io.recorded.mesh_surface import read_mesh
 from hybridreg.io.recorded.recording import ANY, Recorded, Selection
+from hybridreg.io.recorded.vtk_surface import read_vtp
 from hybridreg.io.signatures import kind_of
 from hybridreg.io.whole_files import check_file, read_whole
 
 # Bytes in which the header of a PCD file ends, and in which a file shows what it is.
-_HEADER, _OPENING = 65_536, 1024
+_HEADER, _OPENING = 65_536, 4096
 # Endings of one format.
 _ALIKE = {".laz": ".las", ".arrow": ".feather"}
 # Endings whose files always begin with their signature; what does not is not given to other people's readers.
-_SIGNED = (".e57", ".bag", ".db3", ".mcap", ".parquet", ".feather", ".glb", ".lvx2")
+_SIGNED = (".e57", ".bag", ".db3", ".mcap", ".parquet", ".feather", ".glb", ".lvx2", ".vtp")
 
 # Files that hold points or surfaces, and are not read: what to do instead.
 _ELSEWHERE = {
@@ -41,7 +42,9 @@ _ELSEWHERE = {
     ".rcp": "export it as .pts or .e57 in ReCap, and that as .ply",
     ".pcap": "convert one frame with the sensor's own tool to .csv, .pcd or .las",
     ".lvx": "convert it with Livox Viewer 2 to .lvx2 or .las",
-    ".vtp": "save it as .ply, for example with ParaView",
+    ".vtk": "save it as .vtp or .ply, for example with ParaView",
+    ".vtu": "save its surface as .vtp or .ply, for example by ParaView's Extract Surface",
+    ".pvtp": "it names pieces in other files: give one of those, or save all as one .vtp",
     ".mat": "save the array in it as .csv or .npy",
     ".h5": "save the array in it as .npy",
 }
@@ -70,6 +73,7 @@ READERS: dict[str, Reader] = {
     ".lvx2": read_lvx2,
     **dict.fromkeys((".feather", ".arrow", ".parquet"), read_arrow),
     **dict.fromkeys((".obj", ".stl", ".off", ".glb", ".gltf"), read_mesh),
+    ".vtp": read_vtp,
 }
 """Readers that go to the file themselves, through packages of others; those in which some clouds lie may choose one."""
 
@@ -83,8 +87,8 @@ def read_points(path: str | os.PathLike[str]) -> NDArray[np.float64]:
     binary_compressed), `.bin` (float32 rows of three to six numbers, as KITTI and nuScenes have four and five),
     `.npy`, `.npz` (array `xyz`, `points`, `arr_0` or the only one that fits), text (`.xyz`, `.txt`, `.csv`, `.tsv`,
     `.asc`, `.pts`, `.xyzn`, `.xyzrgb`, `.xyzi`), `.las`/`.laz` (extra `las`; COPC too), and what `READERS` lists: bags
-    (extra `ros`), `.e57` (extra `e57`), `.lvx2`, Arrow's tables (extra `arrow`) and meshes (extra `mesh`); of several
-    clouds the first.
+    (extra `ros`), `.e57` (extra `e57`), `.lvx2`, Arrow's tables (extra `arrow`), meshes (extra `mesh`) and `.vtp`
+    (extra `vtk`); of several clouds the first.
     A file that is not what its name says is refused. Rows that are not finite are kept: the gate decides about them.
 
     Parameters

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 
 from hybridreg.io.faults import FETCH_AGAIN
@@ -54,6 +55,12 @@ _KINDS: tuple[tuple[bytes, Kind], ...] = (
     (b"version https://git-lfs", Kind(words="a Git LFS pointer, not the data", cure="run `git lfs pull`")),
     (b"version https://hawser", Kind(words="a Git LFS pointer, not the data", cure="run `git lfs pull`")),
 )
+_POLY_DATA = Kind(words="a surface or cloud of VTK", suffix=".vtp")
+_OTHER_VTK = Kind(
+    words="data of VTK that are no surface or cloud",
+    cure="save their surface as .vtp, for example by ParaView's Extract Surface",
+)
+_VTK = re.compile(rb"<VTKFile\b[^>]*?\btype\s*=\s*[\"'](\w+)")
 _WEB_PAGE = Kind(words="a web page, probably an error message of the server", cure=FETCH_AGAIN)
 
 
@@ -63,6 +70,9 @@ def kind_of(data: bytes) -> Kind | None:
         if data.startswith(signature):
             return kind
     opening = data[:256].lstrip(b"\xef\xbb\xbf \t\r\n").lower()
+    vtk = _VTK.search(data[:4096])
+    if vtk and opening.startswith((b"<?xml", b"<!--", b"<vtkfile")):
+        return _POLY_DATA if vtk.group(1) == b"PolyData" else _OTHER_VTK
     if opening.startswith((b"<!doctype", b"<html", b"<?xml", b"<head")):
         return _WEB_PAGE
     return None

@@ -34,7 +34,8 @@ class Prior:
     init : (4, 4), path of such a matrix as text, or None
         A rough pose, source to target, in the coordinates of both clouds. Searched around first.
     max_translation : float or None
-        Metres that the middle of the source may lie away from where `init` (or nothing) puts it.
+        Metres that the middle of the source may lie away from where `init` (or nothing) puts it. A start that is turned
+        by some degrees moves a middle that lies far from the source's origin, and that counts.
     max_rotation : float or None
         Degrees that the pose may turn away from `init` (or from none).
     gravity : "known", "unknown", "up", (3,), or two of these vectors
@@ -117,6 +118,7 @@ class Prior:
             target = placing.within_radius(target, middle, crop["radius"], "target")
         size = size_search.found(pair.with_clouds(source, target)) if self.scale else size_search.Size()
         source = placing.sized(source, size.scale)
+        arm = float(np.linalg.norm(np.median(source.points, axis=0) + source.offset))
         up_source, up_target = self._verticals()
         level = _levelling(up_target)
         T_placed_source = level @ start
@@ -129,6 +131,7 @@ class Prior:
             start=centre + source.offset - target.offset,
             max_translation=self.max_translation,
             max_rotation=self.max_rotation,
+            arm=arm,
             up_source=None if up_source is None else T_placed_source[:3, :3] @ up_source,
             up_target=None if up_target is None else level[:3, :3] @ up_target,
         )

@@ -34,6 +34,7 @@ _DISTRIBUTIONS: dict[str, tuple[str, str, tuple[int, int] | None]] = {
     "small_gicp": ("small_gicp", "", None),
     "torch": ("torch", "learned", None),
     "trimesh": ("trimesh", "mesh", None),
+    "vtkmodules": ("vtk", "vtk", None),
 }
 
 

@@ -95,7 +95,13 @@ def judge(scene: Scene, pose: Pose, matches: Correspondences) -> Judgement:
     if scene.explanations:
         probability = min(probability, DOUBTED)
     why = reasons(
-        evidence, weighed.at.agreement, weighed.at.information, found=pose.found, unseen=_unseen(scene)
+        evidence,
+        weighed.at.agreement,
+        weighed.at.information,
+        found=pose.found,
+        unseen=_unseen(scene),
+        explained=bool(scene.explanations),
+        started=scene.pair.placed is not None,
     )
     return Judgement(
         verdict=word(probability),

@@ -33,10 +33,18 @@ def reasons(
     *,
     found: bool,
     unseen: Mapping[str, str],
+    explained: bool = False,
+    started: bool = False,
 ) -> tuple[str, ...]:
-    """Why the verdict is what it is; never empty. `unseen` says why the viewpoint of a cloud is unknown."""
+    """Why the verdict is what it is; never empty. `unseen` says why the viewpoint of a cloud is unknown.
+
+    `explained`: a sentence before these says why no pose was found; `started`: the search began at a given start.
+    """
     if not found:
-        return ("no pose was found: the estimator had nothing to work with, and returned the identity",)
+        instead = "the start" if started else "the identity"
+        if explained:
+            return (f"no pose is left: {instead} was returned",)
+        return (f"no pose was found: the estimator had nothing to work with, and returned {instead}",)
     against = (*_against(evidence, agreement, held), *_unknown(unseen))
     return (*against, _in_favour(evidence)) if against else (_in_favour(evidence),)
 

@@ -93,7 +93,7 @@ def test_data_sets_of_known_direction_are_not_checked(tmp_path: Path) -> None:
 def test_the_check_is_made_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     pairs, calls = listed(tmp_path), []
     whole = direction.check
-    monkeypatch.setattr(direction, "check", lambda *a: (calls.append(1), whole(*a)))
+    monkeypatch.setattr(direction, "check", lambda *a, **k: (calls.append(1), whole(*a, **k)))
     pairs[0], pairs[1]
     # A task of a parallel run unpickles the set anew.
     pickle.loads(pickle.dumps(pairs))[0]

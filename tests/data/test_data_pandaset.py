@@ -20,6 +20,7 @@ from hybridreg.data.lists.azimuth import coverage
 from hybridreg.data.lists.drive_splits import split_of
 from hybridreg.data.lists.frame_pickles import read_columns
 from hybridreg.data.loaders import pandaset
+from hybridreg.data.loaders.folder import load_pair
 from hybridreg.data.loaders.pandaset import PandaSet
 from hybridreg.geometry import se3
 
@@ -182,3 +183,29 @@ def test_an_image_that_is_not_there_is_none(tree: tuple[Path, Any], tmp_path: Pa
     pandaset_trees.write(tmp_path, n=12, pack=pandaset_trees.by_old_pandas)
     (tmp_path / "005" / "camera" / "front_camera" / "00.jpg").unlink()
     assert PandaSet(tmp_path)[0].pair.image is None
+
+
+def rings(points: np.ndarray, eye: np.ndarray) -> float:
+    """How sharply the points lie on cones about the z axis through `eye`, as the beams of a spinning sensor do."""
+    away = points - eye
+    elevation = np.degrees(np.arctan2(away[:, 2], np.hypot(away[:, 0], away[:, 1])))
+    counts, _ = np.histogram(elevation, bins=np.arange(-26.0, 16.0, 0.04))
+    return float((counts.astype(float) ** 2).sum()) / len(points) ** 2
+
+
+@pytest.mark.parametrize("name", ["001-gt-to-p64", "002-gt-to-p64", "002-gt60-to-p64-00"])
+def test_the_sensors_stand_where_the_real_pairs_show_them(real_data: Path, name: str) -> None:
+    labelled = load_pair(real_data / f"pandaset-{name}")
+    if "60" not in name:  # one sweep: the pose is the extrinsic
+        np.testing.assert_allclose(labelled.T_target_source, pandaset._PANDAR64_PANDARGT, atol=1e-6)
+    points = labelled.pair.target.points
+    near = points[(labelled.pair.target.radii > 3.0) & (labelled.pair.target.radii < 25.0)]
+    here = rings(near, np.zeros(3))
+    assert here > 1.3 * max(rings(near, np.array([0.0, 0.0, z])) for z in (-0.3, 0.3))
+    if name.startswith("002"):  # 001 was taken at speed: its sensor moved by most of a metre in a sweep
+        assert here > max(rings(near, np.array([x, y, 0.0])) for x in (-0.4, 0.4) for y in (-0.4, 0.4))
+    forward = labelled.pair.source.points
+    view = np.degrees(np.arctan2(forward[:, 1], forward[:, 0]))
+    low, high = np.quantile(view, [0.01, 0.99])
+    assert (low + high) / 2.0 == pytest.approx(90.0, abs=1.5)
+    assert coverage(forward).role == "limited"

@@ -140,7 +140,7 @@ def test_text_under_every_ending(cloud, ending):
         ("a.bin", b"CCB2" + bytes(200), "CloudCompare's own format.*save it there as .ply or .las"),
         ("a.ply", b"ASTM-E57" + bytes(200), "an E57 file.*rename it to end in .e57"),
         ("a.csv", b"PAR1" + bytes(100), "Parquet"),
-        ("a.vtp", b"<?xml", "ParaView"),
+        ("a.vtk", b"# vtk DataFile", "ParaView"),
         ("a.ptx", b"4", r"\.pts"),
         ("a.pcap", b"\xd4\xc3\xb2\xa1", "sensor's own tool"),
         ("a.mat", b"MATLAB 5.0", "save the array"),

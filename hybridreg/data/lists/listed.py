@@ -80,20 +80,25 @@ class ListedPairs(Dataset):
         return self.entries[index].read()
 
     def load(self, index: int) -> LabelledPair:
-        self.vouch()
+        if self.if_inverted:
+            self.vouch()
         return self.read(index)
 
     def vouch(self) -> None:
-        """`check`, once a process, where nobody has vouched for the poses' direction."""
-        if self.if_inverted and (key := (str(self.origin), self.entries.digest())) not in _CHECKED:
+        """`check`, once a process."""
+        if (key := (str(self.origin), self.entries.digest())) not in _CHECKED:
             self.check()
             _CHECKED.add(key)
 
     def check(self) -> None:
-        """Refuse poses of the wrong direction; runs before the first pair is returned."""
+        """Refuse poses of the wrong direction: before the first pair is returned where the direction is not certain;
+        elsewhere before tables, predictions and training, of a list that was changed, and only where it is clear."""
         from hybridreg.data.lists import direction
 
-        direction.check(self, str(self.origin), self.if_inverted)
+        if self.if_inverted:
+            direction.check(self, str(self.origin), self.if_inverted)
+        else:
+            direction.check(self, str(self.origin), direction.CURE, n=direction.A_FEW, clearly=True)
 
     def fingerprint(self) -> str:
         total = hashlib.blake2b(f"{self.entries.digest():08x}".encode(), digest_size=8)

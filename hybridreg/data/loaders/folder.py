@@ -4,17 +4,24 @@
 from __future__ import annotations
 
 import hashlib
+import inspect
 import os
+from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from hybridreg.config.plain_values import value_of
 from hybridreg.data import content
 from hybridreg.data.dataset import Dataset
+from hybridreg.data.lists import dataset_options, direction
 from hybridreg.geometry import se3
 from hybridreg.io.structured import read_json
 from hybridreg.pair import LabelledPair, Pair
+from hybridreg.resolution import VEHICLES, tolerance
 
+# Folders whose poses' direction this process has looked at.
+_CHECKED: set[tuple[str, bool]] = set()
 # Only these fields reach the pair: others in a meta.json may contain the pose, or allow computing it.
 _FREE_FACTS = ("kind", "source_sensor", "target_sensor", "licence")
 
@@ -29,6 +36,10 @@ class PairFolder(Dataset):
         camera image, and `meta.json` holds `T_target_source`, 4x4, row by row, metres; perhaps `source_viewpoint` and
         `target_viewpoint`: [x, y, z] where the sensor stood in its cloud's frame, "none", or
         {"places": [[x, y, z], ...], "of_point": [row of each point's place, ...]}.
+    inverted : bool
+        The `T_target_source` of every `meta.json` maps target to source, and is to be inverted.
+    trusted : bool
+        The poses' direction is certain: tables, predictions and training do not look at it first.
 
     Raises
     ------
@@ -38,13 +49,13 @@ class PairFolder(Dataset):
         Two files where one is expected.
     """
 
-    def __init__(self, root: str | os.PathLike[str]) -> None:
+    def __init__(self, root: str | os.PathLike[str], inverted: bool = False, trusted: bool = False) -> None:
         folder = Path(root)
         if not folder.is_dir():
             raise FileNotFoundError(
                 f"{folder}: there is no such folder; it must hold one folder for each pair"
             )
-        self.root = folder
+        self.root, self.inverted, self.trusted = folder, inverted, trusted
         self._ids = tuple(sorted(f.name for f in folder.iterdir() if _is_pair(f)))
         if not self.ids:
             raise FileNotFoundError(
@@ -54,12 +65,54 @@ class PairFolder(Dataset):
         for name in self.ids:
             _files(folder / name)
 
+    @classmethod
+    def from_text(cls, text: str) -> PairFolder:
+        """Open it by "PATH", "PATH#inverted" or "PATH#trusted"."""
+        path, options = dataset_options.parse(text, inspect.signature(cls))
+        return cls(path, **options)
+
     @property
     def ids(self) -> tuple[str, ...]:
         return self._ids
 
     def load(self, index: int) -> LabelledPair:
-        return load_pair(self.root / self.ids[index])
+        labelled = load_pair(self.root / self.ids[index])
+        if not self.inverted:
+            return labelled
+        return replace(labelled, T_target_source=se3.inverse(labelled.T_target_source))
+
+    read = load
+
+    @property
+    def if_inverted(self) -> str:
+        """What to do if the poses map target to source."""
+        undo = f"without inverted: {self.root}" if self.inverted else f"by {self.root}#inverted"
+        return f"open the folder {undo}; {self.root}#trusted takes them as they are"
+
+    @property
+    def overlap_radius(self) -> float:
+        """Metres within which two points count as the same place: as far as a right pose may be off, of the first pair
+        that can be read."""
+        for index in range(len(self)):
+            with suppress(OSError, ValueError):
+                pair = self.load(index).pair
+                return tolerance(pair.source, pair.target).metres
+        return VEHICLES.metres
+
+    def vouch(self) -> None:
+        """Look at the direction of a few poses, once a process.
+
+        Raises
+        ------
+        WrongDirection
+            Most of those that tell fit far better inverted.
+        """
+        names = " ".join(self.ids)
+        key = f"{self.root.resolve()} {self.looks() or names}", self.inverted
+        if self.trusted or key in _CHECKED:
+            return
+        direction.check(self, str(self.root), self.if_inverted, n=direction.A_FEW, clearly=True)
+        _CHECKED.add(key)
 
     def fingerprint(self) -> str:
         digests = [self.pair_fingerprint(index) for index in range(len(self))]
@@ -72,7 +125,8 @@ class PairFolder(Dataset):
         """From the content of the pair's own files, so that results stay valid when the folder grows."""
         name = self.ids[index]
         digests = {kind: content.digest(file) for kind, file in _files(self.root / name).items()}
-        total = hashlib.blake2b(repr((name, sorted(digests.items()))).encode(), digest_size=8)
+        told = (name, sorted(digests.items()), *(["inverted"] if self.inverted else []))
+        total = hashlib.blake2b(repr(told).encode(), digest_size=8)
         return f"{total.hexdigest()}-{name}"
 
 

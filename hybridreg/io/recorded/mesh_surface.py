@@ -4,13 +4,15 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hybridreg.io.faults import fault, foreign_parser
 from hybridreg.io.recorded.recording import Recorded, Selection
 from hybridreg.runtime.optional_packages import load
+
+Array = NDArray[np.float64]
 
 # Points of a mesh: some hundreds on each of the cells that a default voxel leaves of it.
 _SAMPLES = 200_000
@@ -27,7 +29,7 @@ def read_mesh(path: Path, selection: Selection) -> Recorded:
     Raises
     ------
     ValueError
-        Damaged, or empty.
+        Damaged, empty, or with faces that are not finite or have no area.
     ImportError
         Without trimesh.
     """
@@ -38,13 +40,38 @@ def read_mesh(path: Path, selection: Selection) -> Recorded:
         parts = loaded.dump() if isinstance(loaded, trimesh.Scene) else [loaded]
         meshes = [part for part in parts if len(getattr(part, "faces", ()))]
         if meshes:
-            return Recorded(_spread(trimesh, meshes), NO_PLACE)
+            triangles = np.vstack([np.asarray(mesh.triangles, dtype=np.float64) for mesh in meshes])
         points = [np.asarray(part.vertices, dtype=np.float64) for part in parts if len(part.vertices)]
+    if meshes:
+        return Recorded(spread_over(triangles, name), NO_PLACE)
     if not points:
         raise fault(name, "holds neither faces nor points", "export it with its geometry")
     return Recorded(np.vstack(points))
 
 
-def _spread(trimesh: Any, meshes: list[Any]) -> Any:
-    mesh = trimesh.util.concatenate(meshes)
-    return np.asarray(trimesh.sample.sample_surface(mesh, _SAMPLES, seed=0)[0], dtype=np.float64)
+def spread_over(triangles: Array, name: str) -> Array:
+    """Points (200,000, 3) drawn evenly over the area of triangles (n, 3, 3), always the same.
+
+    Raises
+    ------
+    ValueError
+        A corner that is not finite, or no area.
+    """
+    bad = int((~np.isfinite(triangles).all(axis=(1, 2))).sum())
+    if bad:
+        raise fault(
+            name, f"{bad} of {len(triangles)} faces have corners that are not finite", "repair the mesh"
+        )
+    along, across = triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
+    area = np.linalg.norm(np.cross(along, across), axis=1)
+    if not area.sum() > 0.0:
+        raise fault(
+            name, f"its {len(triangles)} faces have no area", "export the points, or a proper surface"
+        )
+    rng = np.random.default_rng(0)
+    rows = rng.choice(len(triangles), _SAMPLES, p=area / area.sum())
+    u, v = rng.random((2, _SAMPLES, 1))
+    over = u + v > 1.0  # the other half of the parallelogram, folded back
+    u, v = np.where(over, 1.0 - u, u), np.where(over, 1.0 - v, v)
+    points: Array = triangles[rows, 0] + u * along[rows] + v * across[rows]
+    return points

@@ -1,0 +1,235 @@
+# SPDX-License-Identifier: MIT
+"""Which pairs of many clouds are registered, in rounds, and what their links say together."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterable, Mapping, MutableMapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hybridreg import fitting
+from hybridreg.cloud import PointCloud
+from hybridreg.geometry import se3
+from hybridreg.geometry.extent import reach
+from hybridreg.geometry.viewpoint import centre
+from hybridreg.many.alignment import Alignment
+from hybridreg.many.links import Link, agrees, best_tree, groups, placed
+from hybridreg.many.overlap_guess import signature, unlike
+from hybridreg.many.pose_graph import optimised
+from hybridreg.pair import Pair
+from hybridreg.pipeline import Pipeline
+from hybridreg.resolution import VEHICLES
+from hybridreg.runtime.open3d import load_open3d
+from hybridreg.runtime.workers import spread
+
+Array = NDArray[np.float64]
+Rows = tuple[int, int]
+# Rows of two clouds, and the pose that their registration starts from: 16 numbers, None for none.
+Key = tuple[int, int, tuple[float, ...] | None]
+
+# Rounds in which groups that nothing joins are tried against each other, each with so many of the likeliest pairs.
+_ROUNDS, _LIKELIEST = 4, 3
+# Of a cloud that is placed, so many neighbours within this share of the shorter reach confirm it.
+_NEIGHBOURS, _NEAR = 3, 0.8
+# A doubtful pose may take part, with little weight; one that failed may not.
+_TAKES_PART = 0.5
+
+
+def aligned(
+    clouds: Sequence[PointCloud],
+    names: tuple[str, ...],
+    pipeline: Pipeline,
+    *,
+    ordered: bool = True,
+    known: Mapping[Rows, Any] | None = None,
+    reference: int = 0,
+    seed: int = 0,
+    workers: int | None = None,
+    memory: MutableMapping[Key, Link] | None = None,
+) -> Alignment:
+    """As `register_all`, of checked clouds, two or more.
+
+    Parameters
+    ----------
+    memory : links that were found before, and where each goes as soon as it is found
+        With them the result is the same as without, to the last bit.
+    """
+    start = time.perf_counter()
+    fitting.check_seed(seed)
+    if len(clouds) > 2:
+        load_open3d()  # before the work, not after it
+    memory = {} if memory is None else memory
+    held = [cloud.keeping() for cloud in clouds]
+    middles = np.array([np.median(cloud.points, axis=0) + cloud.offset for cloud in held])
+    links = [_given(rows, T, len(held)) for rows, T in (known or {}).items()]
+    far = unlike([signature(cloud) for cloud in held])
+
+    def tried() -> set[Rows]:
+        return {tuple(sorted((link.source, link.target))) for link in links}  # type: ignore[misc]
+
+    def run(pairs: Iterable[Rows], poses: Array | None = None) -> None:
+        new = sorted({tuple(sorted(pair)) for pair in pairs} - tried())
+        keys = [_key(a, b, poses) for a, b in new]
+        left = [key for key in keys if key not in memory]
+        work = ((b, a, held[b], held[a], pipeline, T, seed) for a, b, T in left)
+        for key, link in zip(left, spread(_linked, work, workers, ordered=True, singly=True), strict=True):
+            memory[key] = link
+        links.extend(memory[key] for key in keys)
+
+    n = len(held)
+    alike = [(k, int(j)) for k in range(n) for j in np.argsort(far[k])[:2] if j != k]
+    run([(k, k + 1) for k in range(n - 1)] if ordered else alike)
+    for _ in range(_ROUNDS):
+        apart = groups(n, _usable(links))
+        if len(apart) == 1:
+            break
+        run(_across(apart, far, tried()))
+    rng = np.random.default_rng([seed, n])
+    tree, fit, root = best_tree(n, _usable(links), middles, rng)
+    poses = placed(n, tree, root)
+    run(_neighbours(held, poses, tried()), poses)
+    tree, fit, root = best_tree(n, _usable(links), middles, rng)
+    poses = _optimised(n, tree, fit, root, reference)
+    links = [replace(link, role=_role(link, tree, fit, poses, middles)) for link in links]
+    found = Alignment(
+        names=names,
+        poses=poses,
+        reference=reference,
+        links=tuple(links),
+        reasons=(),
+        seconds=time.perf_counter() - start,
+    )
+    return replace(found, reasons=tuple(_reasons(found)))
+
+
+def _key(a: int, b: int, poses: Array | None) -> Key:
+    start = None if poses is None else se3.inverse(poses[a]) @ poses[b]
+    return a, b, None if start is None or not np.isfinite(start).all() else tuple(start.ravel().tolist())
+
+
+def _given(rows: Rows, T: Any, n: int) -> Link:
+    source, target = rows
+    if not (0 <= source < n and 0 <= target < n and source != target):
+        raise ValueError(f"known: {rows} are no two rows of the {n} clouds")
+    pose = se3.check(T, f"known[{source}, {target}]")
+    return Link(
+        source=source,
+        target=target,
+        T_target_source=pose,
+        verdict="given",
+        confidence=1.0,
+        metres=VEHICLES.metres,
+    )
+
+
+def _linked(
+    source: int,
+    target: int,
+    moving: PointCloud,
+    still: PointCloud,
+    pipeline: Pipeline,
+    start: tuple[float, ...] | None,
+    seed: int,
+) -> Link:
+    method = pipeline if start is None else pipeline.swap(prior={"init": np.reshape(start, (4, 4))})
+    pair = Pair.of(moving, still, id=f"{source}-{target}")
+    try:
+        result = method.run(pair, seed=seed)
+    except ValueError:  # clouds of which one reaches a hundred times as far, for one
+        return Link(
+            source=source,
+            target=target,
+            T_target_source=np.eye(4),
+            verdict="failed",
+            confidence=0.0,
+            metres=0.0,
+        )
+    return Link(
+        source=source,
+        target=target,
+        T_target_source=result.transformation,
+        verdict=result.verdict,
+        confidence=result.confidence,
+        metres=result.tolerance.metres,
+    )
+
+
+def _usable(links: Sequence[Link]) -> list[Link]:
+    return [link for link in links if link.confidence >= _TAKES_PART]
+
+
+def _across(apart: list[list[int]], far: Array, tried: set[Rows]) -> list[Rows]:
+    # From each group but the largest, the likeliest pairs with clouds of any other.
+    pairs: list[Rows] = []
+    for group in apart[1:]:
+        others = [k for other in apart if other is not group for k in other]
+        ranked = sorted(
+            (far[a, b], a, b) for a in group for b in others if (min(a, b), max(a, b)) not in tried
+        )
+        pairs += [(a, b) for _, a, b in ranked[:_LIKELIEST]]
+    return pairs
+
+
+def _neighbours(held: Sequence[PointCloud], poses: Array, tried: set[Rows]) -> list[Rows]:
+    # Where each cloud was seen from, in the common frame; its nearest others, as long as both see there.
+    eyes = np.array(
+        [
+            se3.apply(pose, (centre(cloud.points, cloud.viewpoint) + cloud.offset)[None])[0]
+            if np.isfinite(pose).all()
+            else np.full(3, np.nan)
+            for cloud, pose in zip(held, poses, strict=True)
+        ]
+    )
+    sees = np.array([reach(cloud.radii) for cloud in held])
+    pairs: list[Rows] = []
+    for k in range(len(held)):
+        away = np.linalg.norm(eyes - eyes[k], axis=1)
+        away[k] = np.nan
+        near = [int(j) for j in np.argsort(away) if away[j] < _NEAR * min(sees[k], sees[j])][:_NEIGHBOURS]
+        pairs += [(k, j) for j in near if (min(k, j), max(k, j)) not in tried]
+    return pairs
+
+
+def _optimised(n: int, tree: Sequence[Link], fit: Sequence[Link], root: int, reference: int) -> Array:
+    poses = placed(n, tree, root)
+    rows = np.flatnonzero(np.isfinite(poses[:, 0, 0]))
+    row_of = {int(k): place for place, k in enumerate(rows)}
+    reached = [link for link in fit if link.source in row_of]
+
+    def in_rows(links: Iterable[Link]) -> list[Link]:
+        return [replace(link, source=row_of[link.source], target=row_of[link.target]) for link in links]
+
+    loops = in_rows(link for link in reached if link not in tree)
+    if len(rows) > 2 and loops:
+        own = in_rows(link for link in reached if link in tree)
+        poses[rows] = optimised(poses[rows], own, loops, row_of.get(reference, 0))
+    if not np.isfinite(poses[reference, 0, 0]):  # nothing ties the reference to the others
+        alone = np.full((n, 4, 4), np.nan)
+        alone[reference] = np.eye(4)
+        return alone
+    moved: Array = se3.inverse(poses[reference]) @ poses
+    moved[reference] = np.eye(4)  # to the last bit
+    return moved
+
+
+def _role(link: Link, tree: Sequence[Link], fit: Sequence[Link], poses: Array, middles: Array) -> Any:
+    if link in tree:
+        return "tree"
+    if link in fit and agrees(link, poses, middles):
+        return "loop"
+    return "contradicts" if link.confidence >= _TAKES_PART else "failed"
+
+
+def _reasons(found: Alignment) -> Iterable[str]:
+    for link in found.links:
+        if link.role == "contradicts":
+            pair = f"{found.names[link.source]} -> {found.names[link.target]} ({link.verdict})"
+            yield f"{pair} contradicts the other links and was left out"
+    for row in np.flatnonzero(~found.placed):
+        yield f"{found.names[row]} is not placed: nothing ties it to {found.names[found.reference]}"
+    for k in found._hanging():
+        yield f"{found.names[k]} hangs on one link, which nothing confirms"
