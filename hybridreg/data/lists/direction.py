@@ -41,7 +41,8 @@ class WrongDirection(ValueError):
 class Readable(Protocol):
     """Pairs that can be read without the check of this module."""
 
-    overlap_radius: float
+    @property
+    def overlap_radius(self) -> float: ...
 
     def __len__(self) -> int: ...
 
