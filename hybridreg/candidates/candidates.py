@@ -21,7 +21,7 @@ from hybridreg.matches import Correspondences, EntryTrace, Overlap, Pose
 from hybridreg.resolution import comparable, size_ratio
 from hybridreg.scene import Scene
 from hybridreg.search.basin_hopping import hop
-from hybridreg.search.hypothesis import Found, Hypothesis, as_hypotheses, as_pose
+from hybridreg.search.hypothesis import Hypothesis, as_hypotheses, as_pose
 from hybridreg.search.pattern_search import climb
 from hybridreg.search.ranking import HOPELESS, counted, distinct
 from hybridreg.search.settle import best_first, second_look
@@ -76,15 +76,11 @@ class Candidates(Stage):
         is tried, as it would converge to nothing.
     enough : float in [0, 1]
         Confidence at which the search stops (the verdict's "ok"); 1 tries every entry.
-    give_up_after : int or None
-        Entries after which no other is run where all poses so far are hopeless: where the first ones search everywhere,
-        such clouds show different places. None runs them all.
     """
 
     of: tuple[Entry, ...] = ({"estimate": "birdseye"}, {"estimate": "kiss"})
     refine: Any = "gicp"
     enough: float = OK
-    give_up_after: int | None = None
 
     def __post_init__(self) -> None:
         if isinstance(self.refine, (str, Mapping)):
@@ -97,10 +93,6 @@ class Candidates(Stage):
             _check(entry)
         if not 0.0 <= self.enough <= 1.0:
             raise ValueError(f"enough={self.enough} must lie between 0 and 1")
-        if self.give_up_after is not None and self.give_up_after < 1:
-            raise ValueError(
-                f"give_up_after={self.give_up_after} must be at least 1, or None to run every entry"
-            )
 
     def __call__(self, scene: Scene, matches: Correspondences, rng: np.random.Generator) -> Pose:
         found: list[Hypothesis] = []
@@ -154,9 +146,7 @@ class Candidates(Stage):
         missing: list[str] = []
         # A generator each, so that an entry's answer does not hang on those before it.
         *generators, last = rng.spawn(len(self.of) + 1)
-        for tried, (entry, own) in enumerate(zip(self.of, generators, strict=True)):
-            if tried == self.give_up_after and found and Found.of(scene).highest < HOPELESS:
-                return
+        for entry, own in zip(self.of, generators, strict=True):
             name, start = _name(entry), time.perf_counter()
             here: list[Hypothesis] = []
             problem = None

@@ -11,7 +11,6 @@ import pytest
 
 import hybridreg as hr
 import hybridreg.data
-from hybridreg.candidates import candidates
 from hybridreg.data.loaders.folder import load_pair
 from hybridreg.geometry import se3
 from hybridreg.testing import check_stage, sample_scene
@@ -95,27 +94,6 @@ def test_doubt_goes_on_to_the_next() -> None:
     assert is_right(pose.T)
     assert len(pose.rivals) == 1
     assert wrong_by(pose.rivals[0])[0] > 90.0
-
-
-ABOVE_IT_ALL = se3.from_rt(TRUTH[:3, :3], TRUTH[:3, 3] + [0.0, 0.0, 40.0])
-
-
-@pytest.mark.parametrize(
-    ("first", "second", "after", "runs"),
-    [
-        (ABOVE_IT_ALL, ABOVE_IT_ALL, None, 3),
-        (ABOVE_IT_ALL, ABOVE_IT_ALL, 2, 2),
-        (ABOVE_IT_ALL, ABOVE_IT_ALL, 1, 1),
-        (ABOVE_IT_ALL, WRONG, 2, 3),  # wrong, though not hopeless: both ends of the street look alike
-    ],
-)
-def test_it_gives_up_where_the_first_entries_found_nothing_but_hopeless_poses(
-    first: np.ndarray, second: np.ndarray, after: int | None, runs: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    # In so small a scene little speaks against a pose.
-    monkeypatch.setattr(candidates, "HOPELESS", 0.0)
-    run(offers("1", first), offers("2", second), offers("3", TRUTH), enough=1.0, give_up_after=after)
-    assert len(CALLS) == runs
 
 
 def test_the_best_by_evidence_wins_whatever_the_order() -> None:
@@ -302,7 +280,6 @@ def test_the_pipeline_comes_back_from_its_file(tmp_path: Path) -> None:
         ({"of": ({"estimate": "kiss", "refine": "gicp"},)}, "holds estimate, refine"),
         ({"of": ({"match": "none", "estimate": "ransac"},)}, "needs 'matches' from the match stage"),
         ({"enough": 1.5}, "enough=1.5"),
-        ({"give_up_after": 0}, "give_up_after=0"),
     ],
 )
 def test_a_recipe_that_makes_no_sense_is_refused(fields: dict[str, Any], words: str) -> None:

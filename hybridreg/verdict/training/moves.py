@@ -57,10 +57,9 @@ PATCHES: dict[str, tuple[Any, str, Any]] = {
     "half turns as rivals": (rivals, "_turned", lambda own: []),
 }
 NONE = "none"
-GIVING_UP = "giving up where hopeless"
-MOVES = (NONE, *PATCHES, GIVING_UP, *ENTRIES)
+MOVES = (NONE, *PATCHES, *ENTRIES)
 # Those that a pair is spared which the first entry answers beyond doubt.
-_OF_LATER = (GIVING_UP, "pattern search", "basin hopping", "second look", *ENTRIES)
+_OF_LATER = ("pattern search", "basin hopping", "second look", *ENTRIES)
 
 
 # A group, or the folder of real pairs, and which of its pairs.
@@ -112,8 +111,6 @@ def measure(case: Case, without: str) -> Row:
     pipeline = Pipeline.preset("default")
     if without in ENTRIES:
         pipeline = without_entry(pipeline, ENTRIES[without])
-    if without == GIVING_UP:
-        pipeline = replace(pipeline, estimate=replace(pipeline.estimate, give_up_after=None))
     start = time.process_time()
     with mock.patch.object(*PATCHES[without]) if without in PATCHES else nullcontext():
         result = pipeline.run(case.pair)
