@@ -198,6 +198,25 @@ def test_every_key_of_a_recipe_is_explained() -> None:
     assert {f.name for kind in kinds for f in fields(kind)} - {"kind"} <= told
 
 
+def test_every_key_of_a_row_is_explained() -> None:
+    from hybridreg.changes import KEYS
+    from hybridreg.eval import table_file
+
+    page = (DOCS / "how-to" / "own-data.md").read_text(encoding="utf-8")
+    rows = page.partition("### Rows of a table")[2].partition("### From Python")[0]
+    told = set(re.findall(r"`(\w+)`", rows))
+    assert {"name", *KEYS, *table_file._CONTROLS} <= told
+    assert {f.name for f in fields(table_file._Content)} - {"row", "paper"} <= told
+
+
+def test_the_columns_of_a_batch_are_explained() -> None:
+    from hybridreg.many import batch_run
+
+    page = (DOCS / "how-to" / "scan-to-map.md").read_text(encoding="utf-8")
+    line = next(line for line in page.splitlines() if line.startswith("| `poses.csv`"))
+    assert re.findall(r"`(\w+)`", line) == list(batch_run._COLUMNS)
+
+
 def test_the_page_of_findings_holds_every_script() -> None:
     text = findings_page.page()
     scripts = sorted(path.name for path in (ROOT / "findings").iterdir())
