@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""When no pose fits: would one fit the source's mirror image, or the source in another unit?"""
+"""When no pose fits: would one beyond its bounds, of the source mirrored, or of the source in another unit?"""
 
 from __future__ import annotations
 
@@ -35,13 +35,19 @@ def explanations(scene: Scene) -> list[str]:
 
     The pose that was found may be as likely: a room that is nearly its own mirror image tells neither.
     """
+    if scene.pair.bounds is not None:
+        T, confidence = _fit(replace(scene.pair, image=None, bounds=None))
+        if confidence >= OK and not scene.pair.allows(T):
+            return [
+                "the clouds fit at a pose beyond what was said of it: are init, its bounds and gravity right?"
+            ]
     for side, factors, sentence in _changes(scene.pair):
         pair = replace(scene.pair, image=None)
         if side == "source":
             pair = replace(pair, source=_changed(pair.source, factors))
         else:
             pair = replace(pair, target=_changed(pair.target, factors))
-        if _fit(pair) >= OK:
+        if _fit(pair)[1] >= OK:
             return [sentence]
     return []
 
@@ -71,10 +77,11 @@ def _changed(cloud: PointCloud, factors: Array) -> PointCloud:
     return PointCloud(points=cloud.points * factors, said=seen._replace(places=seen.places * factors))
 
 
-def _fit(pair: Pair) -> float:
+def _fit(pair: Pair) -> tuple[Array, float]:
+    # The likeliest pose (4, 4) of a short search, and its confidence.
     scene = spec.from_table("voxel", "downsample")(pair)
     search = spec.from_table({"stage": "birdseye", "tries": _TRIES, "again": False}, "estimate")
     pose = search(scene, Correspondences.none(), np.random.default_rng(0))
     if not pose.found or seen_at(scene, [pose.T], 1)[0].log_odds < HOPELESS:
-        return 0.0
-    return weigh(scene, pose).confidence
+        return pose.T, 0.0
+    return pose.T, weigh(scene, pose).confidence

@@ -16,6 +16,7 @@ from hybridreg.evidence.agreement import compare
 from hybridreg.evidence.orientation import overturned
 from hybridreg.evidence.pose_evidence import PoseEvidence
 from hybridreg.geometry import se3
+from hybridreg.geometry.pose_bounds import PoseBounds
 from hybridreg.matches import Correspondences, Pose
 from hybridreg.pair import Pair
 from hybridreg.resolution import comparable, tolerance
@@ -113,6 +114,15 @@ def test_another_unit_is_named_with_its_cloud(crossing: Made, factor: float, uni
     told = input_mistakes.explanations(VoxelGrid()(Pair(source=pair.target, target=pair.source)))
     assert told
     assert f"the target is taken to be in {unit}" in told[0]
+
+
+def test_a_pose_beyond_the_bounds_is_told_before_other_mistakes(crossing: Made) -> None:
+    pair = crossing.scene.pair
+    far = PoseBounds(centre=np.zeros(3), start=np.zeros(3) + 500.0, max_translation=1.0)
+    near = replace(far, start=crossing.truth[:3, 3])
+    told = input_mistakes.explanations(VoxelGrid()(replace(pair, bounds=far)))
+    assert "beyond what was said of it" in told[0]
+    assert input_mistakes.explanations(VoxelGrid()(replace(pair, bounds=near))) == []
 
 
 def test_a_right_pair_is_no_mistake(crossing: Made, elsewhere: Scene) -> None:
