@@ -6,6 +6,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any
 
+from hybridreg.config.number_of import number_of
 from hybridreg.eval.run.row import Row
 from hybridreg.eval.score import scoring
 from hybridreg.eval.score.paper import Printed
@@ -84,8 +85,9 @@ class Table:
     def caption(self, protocol: Protocol) -> str:
         """Which number is this: the data, the starts, the protocol."""
         n = max((len(entry.rows) for entry in self.entries), default=0)
-        runs = f"{n} pairs"
+        runs = number_of(n, "pair")
         if self.starts:
             pairs = n // (self.starts + 1)
-            runs = f"{pairs} pairs, each as it is and under {self.starts} random yaw rotations, {n} runs"
+            turned = number_of(self.starts, "random yaw rotation")
+            runs = f"{number_of(pairs, 'pair')}, each as it is and under {turned}, {n} runs"
         return f"{self.title}. Data {self.data or 'unnamed'}, {runs}; {protocol.describe()}"

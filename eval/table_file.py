@@ -182,6 +182,10 @@ def _grid(base: Changes, sweep: Changes) -> Iterator[Line]:
 
 
 def _build(changed: Mapping[str, Any]) -> Pipeline | Control:
+    keys = (*changes.KEYS, *_CONTROLS)
+    unknown = sorted(set(changed) - set(keys))
+    if unknown:
+        raise ValueError(f"{', '.join(unknown)}: unknown; a row has name, {', '.join(keys)}")
     pipeline = changes.build({key: value for key, value in changed.items() if key not in _CONTROLS})
     oracle, image = changed.get("oracle", ""), changed.get("image", True)
     if oracle not in ("", "overlap"):

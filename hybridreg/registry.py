@@ -81,7 +81,7 @@ def load(slot: str, name: str) -> type[Any]:
     target = known().get(f"{slot}.{name}")
     if target is None:
         near = difflib.get_close_matches(name, names(slot), n=1)
-        hint = f"; did you mean {near[0]!r}?" if near else ""
+        hint = f"; did you mean {near[0]!r}?" if near else "."
         raise KeyError(f"no {slot} stage is called {name!r}{hint} Known: {', '.join(names(slot))}")
     if f"{slot}.{name}" not in BUILT_IN:
         return plugins.load(target, f"{slot} stage {name!r}", ENTRY_POINTS)

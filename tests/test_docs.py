@@ -6,6 +6,7 @@ from __future__ import annotations
 import json
 import re
 import sys
+from dataclasses import fields
 from importlib import import_module
 from pathlib import Path
 from types import ModuleType
@@ -182,6 +183,38 @@ def test_names_after_hr_exist() -> None:
     for page in PAGES:
         for name in re.findall(r"\bhr\.([A-Za-z_]+)", page.read_text(encoding="utf-8")):
             assert name in hr.__all__, f"{page}: {name}"
+
+
+def test_every_key_of_a_recipe_is_explained() -> None:
+    from hybridreg.learned.losses.infonce_loss import InfoNceConfig
+    from hybridreg.learned.training.data.augmentation import Augmentation
+    from hybridreg.learned.training.recipe import LossWeights, Phase, Recipe, Source
+
+    page = (DOCS / "how-to" / "own-network.md").read_text(encoding="utf-8")
+    tables = "\n".join(line for line in page.splitlines() if line.startswith("|"))
+    told = set(re.findall(r"`(?:data\.)?(\w+)`", tables))
+    kinds = (Recipe, Source, Phase, LossWeights, Augmentation, InfoNceConfig)
+    # `kind` is what `network` becomes when a file is read; the file's own name is the recipe's.
+    assert {f.name for kind in kinds for f in fields(kind)} - {"kind"} <= told
+
+
+def test_every_key_of_a_row_is_explained() -> None:
+    from hybridreg.changes import KEYS
+    from hybridreg.eval import table_file
+
+    page = (DOCS / "how-to" / "own-data.md").read_text(encoding="utf-8")
+    rows = page.partition("### Rows of a table")[2].partition("### From Python")[0]
+    told = set(re.findall(r"`(\w+)`", rows))
+    assert {"name", *KEYS, *table_file._CONTROLS} <= told
+    assert {f.name for f in fields(table_file._Content)} - {"row", "paper"} <= told
+
+
+def test_the_columns_of_a_batch_are_explained() -> None:
+    from hybridreg.many import batch_run
+
+    page = (DOCS / "how-to" / "scan-to-map.md").read_text(encoding="utf-8")
+    line = next(line for line in page.splitlines() if line.startswith("| `poses.csv`"))
+    assert re.findall(r"`(\w+)`", line) == list(batch_run._COLUMNS)
 
 
 def test_the_page_of_findings_holds_every_script() -> None:

@@ -106,8 +106,14 @@ def test_a_batch_against_a_map_goes_on_where_it_was_cut_off(town: Any, folder: P
     again = CliRunner().invoke(app, call)
     assert again.exit_code == 0, again.output
     kept = [json.loads(line) for line in path.read_text().splitlines()[1:]]
-    assert kept[:2] == [json.loads(line) for line in lines[1:3]]
+    assert kept[0] == json.loads(lines[2])  # s0; the bad one was tried again
     assert sorted(row["id"] for row in kept) == ["bad", "s0", "s1", "s2"]
+    write_points(folder / "scans" / "bad.pcd", town[1][3])
+    mended = CliRunner().invoke(app, call)
+    assert "4 pairs: 4 ok, 0 doubtful, 0 failed" in mended.output
+    assert [json.loads(line) for line in path.read_text().splitlines()[1:4]] == [
+        r for r in kept if not r["error"]
+    ]
     other = CliRunner().invoke(app, [*call, "--seed", "1"])
     assert other.exit_code == 2
     assert "--overwrite" in other.stderr

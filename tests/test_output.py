@@ -16,6 +16,7 @@ from typer.testing import CliRunner
 import hybridreg as hr
 from hybridreg import testing
 from hybridreg.cli.app import app
+from hybridreg.config.number_of import number_of
 from hybridreg.geometry import se3
 from hybridreg.io import read_points, write_points
 from hybridreg.output import pose_text
@@ -151,3 +152,22 @@ def test_the_command_line_writes_clouds(tmp_path: Path, ending: str) -> None:
         done = CliRunner().invoke(app, [*call, *wrong])
         assert done.exit_code == 2
         assert wrong[1] in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("n", "nouns", "told"),
+    [
+        (0, ("pair",), "0 pairs"),
+        (1, ("pair",), "1 pair"),
+        (2, ("other pose",), "2 other poses"),
+        (1, ("entry", "entries"), "1 entry"),
+        (3, ("entry", "entries"), "3 entries"),
+    ],
+)
+def test_a_number_stands_before_its_noun_in_the_right_form(n: int, nouns: tuple[str, ...], told: str) -> None:
+    assert number_of(n, *nouns) == told
+
+
+def test_one_rival_is_no_plural(result: tuple[hr.RegistrationResult, hr.Pair, np.ndarray]) -> None:
+    one = dataclasses.replace(result[0], rivals=np.eye(4)[None])
+    assert "as well or better: 1 other pose\n" in one.summary()

@@ -6,6 +6,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 
+from hybridreg.config.number_of import number_of
 from hybridreg.eval.run.row import Row
 from hybridreg.eval.score import errors
 from hybridreg.eval.score.protocols import Protocol
@@ -95,7 +96,7 @@ def by_overlap(name: str, rows: Sequence[Row], protocol: Protocol) -> Cells:
             if row.overlap is not None and low <= row.overlap < high
         ]
         share = percent(sum(hits) / len(hits)) if hits else "–"
-        cells[f"overlap {low:g} to {min(high, 1.0):g}"] = f"{share} ({len(hits)} pairs)"
+        cells[f"overlap {low:g} to {min(high, 1.0):g}"] = f"{share} ({number_of(len(hits), 'pair')})"
     return cells
 
 

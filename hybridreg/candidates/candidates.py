@@ -113,8 +113,8 @@ class Candidates(Stage):
                 break
         if confidence < _SURE:
             with scene.clock.phase("verdict"):
-                scene.explanations.extend(shut_out.explanations(scene, beyond, found))
-                scene.explanations.extend(input_mistakes.explanations(scene))
+                shut = shut_out.explanations(scene, beyond, found)
+                scene.explanations.extend(shut or input_mistakes.explanations(scene))
         won = found[0].came_from if found else None
         return replace(pose, entries=tuple(trace._replace(won=trace.entry == won) for trace in traces))
 

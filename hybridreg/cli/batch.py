@@ -13,6 +13,7 @@ import typer
 from hybridreg.cli import options
 from hybridreg.cli.terminal.error_messages import plainly
 from hybridreg.cli.terminal.stop_signals import going_on
+from hybridreg.config.number_of import number_of
 
 
 @plainly
@@ -61,6 +62,7 @@ def command(
         if row["error"]:
             print(f"{row['id']}: {row['error']}")
     print(
-        f"{len(rows)} pairs: " + ", ".join(f"{counts[word]} {word}" for word in ("ok", "doubtful", "failed"))
+        f"{number_of(len(rows), 'pair')}: "
+        + ", ".join(f"{counts[word]} {word}" for word in ("ok", "doubtful", "failed"))
     )
     print(f"written to {out}: rows.jsonl, poses.csv")

@@ -12,7 +12,11 @@ Preset = Annotated[str | None, typer.Option(help="Pipeline by name; see `hybridr
 PipelineFile = Annotated[Path | None, typer.Option(help="Pipeline as a TOML file, instead of a preset.")]
 Settings = Annotated[
     list[str] | None,
-    typer.Option("--set", metavar="slot=name", help="Another stage, or slot.field=value; repeatable."),
+    typer.Option(
+        "--set",
+        metavar="slot=name",
+        help="Another stage (refine=icp) or a field (refine.kind=plane, prior.max_rotation=30); repeatable.",
+    ),
 ]
 Voxel = Annotated[float | None, typer.Option(help="Voxel, metres; derived from the clouds if not given.")]
 Seed = Annotated[int, typer.Option(help="Fixes every random choice.")]

@@ -43,10 +43,11 @@ class Information:
 
     @property
     def words(self) -> str:
-        """The poorly constrained motion as a phrase: `along x of the target (0.98 0.17 0.00)`."""
+        """The poorly constrained motion as a phrase: `along x of the target (0.98 0.17 0.00)`, `in a turn about` it."""
         axis = int(np.argmax(np.abs(self.direction)))
-        numbers = " ".join(f"{x:.2f}" for x in self.direction * np.sign(self.direction[axis]))
-        return f"{'a turn about' if self.turns else 'along'} {'xyz'[axis]} of the target ({numbers})"
+        pointing = np.round(self.direction * np.sign(self.direction[axis]), 2) + 0.0  # no "-0.00"
+        numbers = " ".join(f"{x:.2f}" for x in pointing)
+        return f"{'in a turn about' if self.turns else 'along'} {'xyz'[axis]} of the target ({numbers})"
 
 
 def measure(agreement: Agreement, target: View) -> Information:

@@ -61,7 +61,7 @@ def run(
     on_row: Callable[[Row], None] = lambda row: None,
 ) -> list[Row]:
     """Register every pair that the folder does not hold yet: `rows.jsonl` grows as they are done, `poses.csv` is
-    written at the end.
+    written at the end. Pairs that ended with an `error` are tried again, as their files may have been mended since.
 
     Each target is prepared once in each process (`Target`). A pair that cannot be read or registered is a row with its
     `error`, and verdict "failed".
@@ -118,7 +118,7 @@ def _read(path: Path, settings: Row) -> dict[tuple[str, str, str], Row]:
         if not lines:
             return {}
         header, *rows = (json.loads(line) for line in lines)
-        found = {(row["id"], row["source"], row["target"]): row for row in rows}
+        found = {(row["id"], row["source"], row["target"]): row for row in rows if not row["error"]}
     except (ValueError, TypeError, KeyError) as error:
         raise ValueError(f"{path}: damaged ({error}); add --overwrite to make it anew") from error
     if header != json.loads(json.dumps(settings)):
@@ -126,6 +126,8 @@ def _read(path: Path, settings: Row) -> dict[tuple[str, str, str], Row]:
             f"{path}: was made with other settings; add --overwrite to make it anew, or choose another --out"
         )
     cut(path, length)
+    if len(found) < len(rows):
+        write_text(path, "".join(json.dumps(each) + "\n" for each in (header, *found.values())))
     return found
 
 

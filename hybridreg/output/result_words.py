@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hybridreg.config.number_of import number_of
 from hybridreg.geometry import se3
 
 if TYPE_CHECKING:
@@ -27,7 +28,8 @@ def summary(result: RegistrationResult) -> str:
     if result.verdict == "ok":
         lines.append(f"one standard deviation: {_spread(result)}")
     if len(result.rivals):
-        lines.append(f"{len(result.rivals)} other poses explain the clouds nearly as well")
+        others = number_of(len(result.rivals), "other pose")
+        lines.append(f"rivals, which explain the clouds nearly as well or better: {others}")
     lines += [f"- {each}" for each in result.reasons]
     lines += [f"note: {each}" for each in result.notes]
     lines += [f"found by {found_by(result)}"] if result.entries else []
@@ -35,13 +37,13 @@ def summary(result: RegistrationResult) -> str:
 
 
 def found_by(result: RegistrationResult) -> str:
-    """The entry that the pose came from, and how many ran: `relief, entry 2 of the 6 that ran (0.4 of 5.3 s)`."""
+    """The entry that the pose came from, and how many ran: `relief, entry 2 of 6 tried (0.4 of 5.3 s)`."""
     won = next((each for each in result.entries if each.won), None)
     total = sum(each.seconds for each in result.entries)
     if won is None:
-        return f"none of {len(result.entries)} entries ({total:.1f} s)"
+        return f"none of {number_of(len(result.entries), 'entry', 'entries')} ({total:.1f} s)"
     place = 1 + result.entries.index(won)
-    return f"{won.entry}, entry {place} of the {len(result.entries)} that ran ({won.seconds:.1f} of {total:.1f} s)"
+    return f"{won.entry}, entry {place} of {len(result.entries)} tried ({won.seconds:.1f} of {total:.1f} s)"
 
 
 def html(result: RegistrationResult) -> str:

@@ -83,7 +83,7 @@ def _against(evidence: Evidence, agreement: Agreement, held: Information) -> Ite
 
 
 def _about_axis(agreement: Agreement, k: int) -> str:
-    direction = " ".join(f"{x:.2f}" for x in agreement.axes[k])
+    direction = " ".join(f"{x:.2f}" for x in np.round(agreement.axes[k], 2) + 0.0)  # no "-0.00"
     looked, agreed = int(agreement.looked[k]), int(agreement.agreed[k])
     if looked < FEW:
         return f"only {looked} points visible to both sensors face along ({direction}) of the target, {agreed} agree"

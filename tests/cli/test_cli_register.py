@@ -142,7 +142,8 @@ def test_an_image_and_a_pipeline_file_are_taken(clouds: tuple[str, str], tmp_pat
     [
         (["--preset", "icq"], "no preset is called 'icq'. Known: "),
         (["--set", "match"], "--set match: expected slot=name"),
-        (["--set", "refine=icq"], "no refine stage is called 'icq'"),
+        (["--set", "refine=icq"], "no refine stage is called 'icq'; did you mean 'icp'? Known: "),
+        (["--set", "refine=nearest"], "no refine stage is called 'nearest'. Known: "),
         (["--set", "refine=icp", "--set", "refine.color=1"], "its fields are"),
         (["--voxel", "-1", "--preset", "icp"], "--voxel -1.0 must be a positive length"),
         (["--pipeline", "nowhere.toml"], "nowhere.toml: no such file; check the name"),

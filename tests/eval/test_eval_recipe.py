@@ -78,7 +78,10 @@ def test_a_combination_that_does_not_fit_stays_with_its_reason() -> None:
             "rows: unknown; a table has base, data, paper, protocols, row, seed, starts, sweep, title",
         ),
         ({"row": [{"preset": "icp"}, {"preset": "icp"}]}, "two rows are called 'icp'"),
-        ({"row": [{"preset": "icp", "refin": "none"}]}, "refin: unknown"),
+        (
+            {"row": [{"preset": "icp", "refin": "none"}]},
+            "refin: unknown; a row has name, preset, pipeline, voxel",
+        ),
         ({"base": BASE, "sweep": {"refine": "icp"}}, "sweep refine: expected a list of values, got 'icp'"),
         ({"row": [{"downsample": "none", "voxel": 0.3}]}, "AllPoints has no voxel"),
     ],

@@ -94,7 +94,7 @@ def test_a_folder_without_a_table_says_so(tmp_path: Path) -> None:
 
 def test_caption_names_data_starts_and_protocol(ran: tuple[Table, Path]) -> None:
     caption = ran[0].caption(CROSS)
-    for part in ("Stubs & friends", "scattered", "3 pairs", "6 runs", "1 random yaw rotations", "protocol cross3dreg",
+    for part in ("Stubs & friends", "scattered", "3 pairs", "1 random yaw rotation, 6 runs", "protocol cross3dreg",
                  "RRE < 2° and RTE < 0.5 m", "within 1 m", "over all pairs"):  # fmt: skip
         assert part in caption
 
@@ -140,7 +140,7 @@ def test_recall_by_overlap() -> None:
     sparse = Table(title="t", data="d", seed=0, starts=0, entries=[Entry(name="m", rows=rows)])
     assert formats.tables(sparse, KITTI)["Recall by overlap"] == [
         {"method": "m", "overlap 0 to 0.3": "50.0 (2 pairs)", "overlap 0.3 to 0.6": "– (0 pairs)",
-         "overlap 0.6 to 1": "100.0 (1 pairs)"}
+         "overlap 0.6 to 1": "100.0 (1 pair)"}
     ]  # fmt: skip
 
 

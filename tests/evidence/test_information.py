@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: MIT
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from made_places import Made
@@ -23,6 +25,8 @@ def test_a_corridor_is_open_along_itself(corridor: Made) -> None:
     assert not found.turns
     assert abs(found.direction[0]) > 0.99
     assert found.words.startswith("along x of the target (1.00")
+    turning = replace(found, turns=True, direction=np.array([0.0, 0.0, -1.0]))
+    assert turning.words == "in a turn about z of the target (0.00 0.00 1.00)"
 
 
 def test_a_crossing_is_held_in_every_direction(crossing: Made) -> None:

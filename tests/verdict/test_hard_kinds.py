@@ -16,8 +16,10 @@ from hybridreg.evidence.agreement import compare
 from hybridreg.evidence.orientation import overturned
 from hybridreg.evidence.pose_evidence import PoseEvidence
 from hybridreg.geometry import se3
+from hybridreg.geometry.pose_bounds import PoseBounds
 from hybridreg.matches import Correspondences, Pose
 from hybridreg.pair import Pair
+from hybridreg.pipeline import Pipeline
 from hybridreg.resolution import comparable, tolerance
 from hybridreg.scene import Scene
 from hybridreg.search.repeats import copies
@@ -113,6 +115,14 @@ def test_another_unit_is_named_with_its_cloud(crossing: Made, factor: float, uni
     told = input_mistakes.explanations(VoxelGrid()(Pair(source=pair.target, target=pair.source)))
     assert told
     assert f"the target is taken to be in {unit}" in told[0]
+
+
+def test_a_pose_beyond_the_bounds_is_told_before_other_mistakes(crossing: Made) -> None:
+    pair = crossing.scene.pair
+    bounds = PoseBounds(centre=np.zeros(3), start=np.zeros(3) + 500.0, max_translation=1.0)
+    reasons = Pipeline.preset("default").run(replace(pair, bounds=bounds)).reasons
+    assert any("shut out" in reason for reason in reasons)
+    assert not any("mirror" in reason for reason in reasons)
 
 
 def test_a_right_pair_is_no_mistake(crossing: Made, elsewhere: Scene) -> None:
