@@ -35,6 +35,18 @@ def test_a_saved_network_comes_back(folder: Path, network: RegistrationNetwork, 
     assert sorted(path.name for path in folder.iterdir()) == ["config.json", "model.safetensors"]
 
 
+def test_half_the_size_keeps_what_half_the_precision_cannot_hold(
+    network: RegistrationNetwork, tmp_path: Path
+) -> None:
+    names = [name for name, _ in network.named_parameters()][:2]
+    with torch.no_grad():
+        network.get_parameter(names[0]).view(-1)[0] = 1e5
+    save_pretrained(network, tmp_path, half=True)
+    stored = load_file(tmp_path / "model.safetensors")
+    assert [stored[name].dtype for name in names] == [torch.float32, torch.float16]
+    assert float(from_pretrained(tmp_path).get_parameter(names[0]).detach().view(-1)[0]) == 1e5
+
+
 def spoil(folder: Path, **changes: torch.Tensor | None) -> None:
     """Replace or drop tensors of a saved network."""
     tensors = load_file(folder / "model.safetensors")

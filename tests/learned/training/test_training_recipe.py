@@ -9,15 +9,17 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import torch
 from training_runs import MakeRecipe, write_recipe
 from typer.testing import CliRunner
 
 from hybridreg.cli.app import app
 from hybridreg.learned import recipes
+from hybridreg.learned.network_table import network_class
 from hybridreg.learned.training import recipe_file
 from hybridreg.learned.training.data import data_choice
 from hybridreg.learned.training.recipe import Phase
-from hybridreg.learned.training.schedule import rate_at, steps_of
+from hybridreg.learned.training.schedule import make_optimizer, rate_at, steps_of
 
 PHASE = {"name": "p", "steps": 2}
 
@@ -107,6 +109,42 @@ def test_the_paper_recipe_is_the_published_schedule() -> None:
     assert rate_at(phase, 3999, steps) == pytest.approx(1e-4)
     assert rate_at(phase, 4000, steps) == pytest.approx(0.95e-4)
     assert rate_at(phase, steps - 1, steps) == pytest.approx(1e-4 * 0.95**4)
+
+
+# Optimiser, and the rate's fall from the first step to the last, as released: factor ** epochs.
+PUBLISHED = {
+    "fcgf-small": ("sgd", 0.99**200),
+    "omnet-small": ("adam", 1.0),
+    "predator-small": ("sgd", 0.99**149),
+    "cofinet-small": ("adam", 0.95**149),
+    "roitr-small": ("adam", 0.95**149),
+    "vrhcf-small": ("adam", 0.5**7),
+}
+
+
+@pytest.mark.parametrize("name", PUBLISHED)
+def test_the_networks_of_table_2_see_the_same_pairs_and_fall_as_published(name: str) -> None:
+    recipe, first = recipe_file.read(name), recipe_file.read("omnet-small")
+    assert (recipe.data, recipe.augmentation, recipe.seed) == (first.data, first.augmentation, first.seed)
+    assert recipe.augmentation.rotation == "yaw"
+    (phase,) = recipe.phase
+    assert phase.steps * phase.accumulate == 720
+    optimizer, fall = PUBLISHED[name]
+    assert phase.optimizer == optimizer
+    # The last step comes just before the last factor.
+    assert rate_at(phase, phase.steps - 1, phase.steps) / phase.rate == pytest.approx(fall, rel=0.06)
+
+
+def test_sgd_has_its_momentum_and_a_wrong_one_is_refused() -> None:
+    network = network_class("fcgf").named("nano")
+    phase = Phase(name="p", steps=1, rate=0.1, optimizer="sgd", momentum=0.8, weight_decay=1e-4)
+    made = make_optimizer(phase, network)
+    assert isinstance(made, torch.optim.SGD)
+    (group,) = made.param_groups
+    assert (group["lr"], group["momentum"], group["weight_decay"]) == (0.1, 0.8, 1e-4)
+    for momentum in (-0.1, 1.0):
+        with pytest.raises(ValueError, match=f"momentum={momentum} must be"):
+            Phase(name="p", steps=1, momentum=momentum)
 
 
 def test_rates_rise_then_fall() -> None:
