@@ -29,8 +29,9 @@ if TYPE_CHECKING:
 def save_pretrained(network: Pretrained, folder: str | os.PathLike[str], *, half: bool = False) -> None:
     """Write ``config.json`` and ``model.safetensors`` into a folder, each whole or not at all.
 
-    ``half`` stores float16, half the size; a network that reads it computes in float32 all the same. A tensor with a
-    value that float16 cannot hold stays as it is: a variance over counts, say.
+    ``half`` stores float16, half the size; a network that reads it computes in float32 all the same. A tensor that
+    float16 cannot hold stays as it is: a variance over counts, or a bias so small that only zeros would be left, by
+    which some networks know that they were never trained.
     """
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
@@ -49,7 +50,8 @@ def _halved(tensor: Tensor) -> Tensor:
     if not tensor.is_floating_point():
         return tensor
     half = tensor.half()
-    return half if torch.equal(half.isfinite(), tensor.isfinite()) else tensor
+    held = torch.equal(half.isfinite(), tensor.isfinite()) and bool(half.any()) == bool(tensor.any())
+    return half if held else tensor
 
 
 def from_pretrained(name_or_folder: str | os.PathLike[str], wanted: str | None = None) -> Pretrained:
