@@ -36,6 +36,8 @@ class Table:
     starts : turned copies of each pair
     problems : lines that could not be built or run, with the reason
     left_out : what some lines did without, for want of a package
+    visits : training pairs that a method's weights have seen, repeats counted; methods without weights
+        are left out
     paper : figures that somebody printed, to be shown apart
     """
 
@@ -46,6 +48,7 @@ class Table:
     entries: list[Entry]
     problems: dict[str, str] = field(default_factory=dict)
     left_out: dict[str, str] = field(default_factory=dict)
+    visits: dict[str, int] = field(default_factory=dict)
     paper: Printed | None = None
 
     def remarks(self) -> list[str]:

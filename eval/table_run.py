@@ -18,7 +18,7 @@ from hybridreg.eval.run.row import Row
 from hybridreg.eval.score import paper, scoring
 from hybridreg.eval.scored_table import IDENTITY, Entry, Table
 from hybridreg.eval.table_file import Recipe, slug
-from hybridreg.io import write_json
+from hybridreg.io import shipped_weights, write_json
 from hybridreg.io.lock import folder_lock
 from hybridreg.io.structured import read_json
 from hybridreg.pair import LabelledPair
@@ -39,6 +39,7 @@ class Index:
     lines: tuple[str, ...]
     problems: Mapping[str, str]
     left_out: Mapping[str, str] = field(default_factory=dict)
+    visits: Mapping[str, int] = field(default_factory=dict)
     paper: Mapping[str, Any] | None = None
 
     def __post_init__(self) -> None:
@@ -143,6 +144,7 @@ def _run(
         "lines": lines,
         "problems": problems,
         "left_out": {name: text for name in lines if (text := optional_packages.left_out(methods[name]))},
+        "visits": _visits({name: methods[name] for name in lines}),
         "paper": None if recipe.paper is None else recipe.paper.to_dict(),
     }
     write_json(folder / _INDEX, index)
@@ -168,6 +170,7 @@ def load(folder: str | os.PathLike[str]) -> Table:
         starts=index.starts,
         problems=dict(index.problems),
         left_out=dict(index.left_out),
+        visits=dict(index.visits),
         paper=None if index.paper is None else paper.parse(index.paper),
         entries=_with_identity(entries),
     )
@@ -215,6 +218,12 @@ def read_index(folder: str | os.PathLike[str]) -> Index:
     if not path.is_file():
         raise FileNotFoundError(f"{os.fspath(folder)}: no table was run there; run `hybridreg table` first")
     return build(Index, read_json(path), str(path))
+
+
+def _visits(methods: Mapping[str, Any]) -> dict[str, int]:
+    # Stored with the rows: the weights of that name may be others when the report is written again.
+    found = {name: shipped_weights.visits_of(method) for name, method in methods.items()}
+    return {name: count for name, count in found.items() if count is not None}
 
 
 def _entry(name: str, path: Path) -> Entry:

@@ -29,7 +29,9 @@ if TYPE_CHECKING:
 def save_pretrained(network: Pretrained, folder: str | os.PathLike[str], *, half: bool = False) -> None:
     """Write ``config.json`` and ``model.safetensors`` into a folder, each whole or not at all.
 
-    ``half`` stores float16, half the size; a network that reads it computes in float32 all the same.
+    ``half`` stores float16, half the size; a network that reads it computes in float32 all the same. A tensor that
+    float16 cannot hold stays as it is: a variance over counts, or a bias so small that only zeros would be left, by
+    which some networks know that they were never trained.
     """
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
@@ -38,12 +40,18 @@ def save_pretrained(network: Pretrained, folder: str | os.PathLike[str], *, half
     text = json.dumps({**named, **network.config.to_dict()}, indent=1) + "\n"
     tensors = {name: tensor.detach().cpu().contiguous() for name, tensor in network.state_dict().items()}
     if half:
-        tensors = {
-            name: tensor.half() if tensor.is_floating_point() else tensor for name, tensor in tensors.items()
-        }
+        tensors = {name: _halved(tensor) for name, tensor in tensors.items()}
     # Serialised here: safetensors would replace the file by one that only its owner can read.
     write_bytes(folder / WEIGHTS_FILE, save(tensors))
     write_text(folder / CONFIG_FILE, text)
+
+
+def _halved(tensor: Tensor) -> Tensor:
+    if not tensor.is_floating_point():
+        return tensor
+    half = tensor.half()
+    held = torch.equal(half.isfinite(), tensor.isfinite()) and bool(half.any()) == bool(tensor.any())
+    return half if held else tensor
 
 
 def from_pretrained(name_or_folder: str | os.PathLike[str], wanted: str | None = None) -> Pretrained:

@@ -16,7 +16,6 @@ from typing import Any
 from hybridreg.eval.report.cloud_pictures import new_figure, save
 from hybridreg.learned.training.curve_files import CurveFile
 
-LOSSES = ("infonce", "coarse", "fine", "mask")
 # Validation figures: in a warm-up the inlier ratio is that of mutual nearest neighbours.
 FOUND = ("inlier_ratio", "pir", "recall", "mask_f1")
 COLOURS = ("#1b6ca8", "#d95f02", "#3a7d44", "#8e44ad")
@@ -26,6 +25,12 @@ def curve(rows: Sequence[dict[str, str]], name: str) -> tuple[list[int], list[fl
     """Steps and values of a column where it has any."""
     found = [(int(row["total"]), float(row[name])) for row in rows if row.get(name) not in (None, "", "nan")]
     return [step for step, _ in found], [value for _, value in found]
+
+
+def losses(log: Sequence[dict[str, str]]) -> list[str]:
+    """The parts of the loss: a log has them between their sum and the share of right matches."""
+    columns = list(log[0]) if log else []
+    return columns[columns.index("loss") + 1 : columns.index("hits")] if log else []
 
 
 def smoothed(values: list[float], width: int = 5) -> list[float]:
@@ -47,7 +52,7 @@ def draw(figure: Any, chosen: list[Path]) -> None:
     panels = figure.subplots(2, len(chosen), squeeze=False)
     for (above, below), run in zip(panels.T, chosen, strict=True):
         log, validation = (CurveFile(run / name, ()).rows() for name in ("log.csv", "validation.csv"))
-        for name, colour in zip(LOSSES, COLOURS, strict=True):
+        for name, colour in zip(losses(log), COLOURS, strict=False):
             steps, values = curve(log, name)
             if steps and any(values):
                 above.plot(steps, smoothed(values), color=colour, label=name)

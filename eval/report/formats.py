@@ -26,6 +26,7 @@ _LATEX |= {
     "^": r"\textasciicircum{}",
 }
 
+_VISITS_NOTE = " Visits are the training pairs that a method's weights have seen, repeats counted."
 _CONTROL_NOTE = f" Rows with{MARK} are controls, not methods: their overlap was taken from the ground truth."
 
 
@@ -51,6 +52,7 @@ def fine_print(table: Table) -> str:
         f"{min(100.0, 300 / max(len(scenes), 1)):.0f} percentage points (the rule of three). A pair "
         "without a pose counts as the identity and never as a success. Seconds are wall time, one thread a pair; "
         f"seed {table.seed}."
+        f"{_VISITS_NOTE if table.visits else ''}"
         f"{_CONTROL_NOTE if any(MARK in entry.name for entry in table.entries) else ''}"
     )
 
@@ -60,7 +62,9 @@ def tables(table: Table, protocol: Protocol) -> dict[str, list[Cells]]:
     scores = table.scores(protocol)
     with_verdict = [e for e in table.methods if any(row.verdict for row in e.rows)]
     return {
-        "Results": [table_columns.results(name, score) for name, score in scores.items()],
+        "Results": [
+            table_columns.results(name, score) | _visits(table, name) for name, score in scores.items()
+        ],
         **_differences(table, protocol),
         "Recall at fixed thresholds": [
             table_columns.thresholds(name, score) for name, score in scores.items()
@@ -72,6 +76,11 @@ def tables(table: Table, protocol: Protocol) -> dict[str, list[Cells]]:
         "Verdict against success": [table_columns.verdicts(e.name, e.rows, protocol) for e in with_verdict],
         "Seconds of each stage": table_columns.stages(scores),
     }
+
+
+def _visits(table: Table, name: str) -> Cells:
+    # A column of every line or of none.
+    return {"visits": f"{table.visits[name]:,}" if name in table.visits else "–"} if table.visits else {}
 
 
 def _differences(table: Table, protocol: Protocol) -> dict[str, list[Cells]]:
@@ -91,7 +100,7 @@ def markdown_table(lines: Sequence[Cells]) -> str:
 
 
 def latex(table: Table, protocols: Sequence[Protocol]) -> str:
-    """The table of every protocol as papers print it, in four columns, for the package booktabs."""
+    """The table of every protocol as papers print it, for the package booktabs."""
     parts = []
     for each in protocols:
         parts.append(
@@ -105,7 +114,8 @@ def latex(table: Table, protocols: Sequence[Protocol]) -> str:
 
 def printed(table: Table, protocol: Protocol) -> list[Cells]:
     """A protocol's lines as papers print them."""
-    return [table_columns.printed(name, score) for name, score in table.scores(protocol).items()]
+    scores = table.scores(protocol).items()
+    return [table_columns.printed(name, score) | _visits(table, name) for name, score in scores]
 
 
 def _latex_table(caption: str, lines: Sequence[Cells]) -> str:
@@ -133,6 +143,7 @@ def table_csv(table: Table, protocols: Sequence[Protocol]) -> str:
             at, seconds = fields.pop("recall_at"), fields.pop("seconds")
             lines.append(
                 {"method": name, "data": table.data, **fields}
+                | ({"visits": table.visits[name]} if name in table.visits else {})
                 | {f"recall at {key}": value for key, value in at.items()}
                 | {f"seconds {stage}": value for stage, value in seconds.items()}
             )

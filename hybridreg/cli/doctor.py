@@ -40,11 +40,13 @@ _NEEDED = {
 def command() -> None:
     """Print versions, which libraries load, and whether there is a GPU."""
     import hybridreg
+    from hybridreg.io import shipped_weights
 
     print(f"hybridreg {hybridreg.__version__}, Python {platform.python_version()}, {platform.platform()}")
     for module, (distribution, purpose) in _NEEDED.items():
         print(f"  {distribution} {_installed(distribution)}: {_loads(module)} (for {purpose})")
     print(f"GPU: {_gpu()}")
+    print(f"weights that come with the package: {', '.join(shipped_weights.names()) or 'none'}")
     for line in (*_unloadable_stages(), *_unloadable_networks()):
         print(line)
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""`hybridreg list`: the names of stages, presets, data sets, tables, protocols, recipes and networks."""
+"""`hybridreg list`: the names of stages, presets, data sets, tables, protocols, recipes, networks and weights."""
 
 from __future__ import annotations
 
@@ -22,11 +22,12 @@ class Kind(str, Enum):
     protocols = "protocols"
     recipes = "recipes"
     networks = "networks"
+    weights = "weights"
 
 
 @plainly
 def command(kind: Annotated[Kind | None, typer.Argument(help="All kinds if not given.")] = None) -> None:
-    """List stages, presets, data sets, tables, protocols, training recipes, and networks with their sizes."""
+    """List stages, presets, data sets, tables, protocols, training recipes, networks and shipped weights."""
     for each in Kind if kind is None else [kind]:
         print(f"{each.value}:")
         for line in lines(each):
@@ -55,6 +56,8 @@ def lines(kind: Kind) -> Iterator[str]:
         yield from recipes.names()
     elif kind is Kind.networks:
         yield from (f"{name}: {sizes}" for name, sizes in _networks())
+    elif kind is Kind.weights:
+        yield from _weights()
     else:
         yield from (each.describe().removeprefix("protocol ") for each in protocols.PROTOCOLS.values())
 
@@ -67,6 +70,14 @@ def _networks() -> Iterator[tuple[str, str]]:
             yield name, ", ".join(network_class(name).sizes)
         except ImportError as error:  # torch may be missing: the other kinds are listed all the same
             yield name, f"does not load: {error}"
+
+
+def _weights() -> Iterator[str]:
+    from hybridreg.io import shipped_weights
+
+    for name in shipped_weights.names():
+        visits = shipped_weights.visits(name)
+        yield name if visits is None else f"{name}: {visits:,} visits of training pairs"
 
 
 def _remark(preset: str) -> str:

@@ -9,8 +9,11 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
+from hybridreg.io.structured import read_json
+
 CONFIG_FILE = "config.json"
 WEIGHTS_FILE = "model.safetensors"
+CARD_FILE = "card.json"
 
 
 class MissingWeights(FileNotFoundError):
@@ -32,6 +35,30 @@ def find(name: str | os.PathLike[str]) -> Path | None:
 def is_complete(folder: Path) -> bool:
     """Are the weights and their configuration in a folder?"""
     return (folder / CONFIG_FILE).is_file() and (folder / WEIGHTS_FILE).is_file()
+
+
+def visits(name: str | os.PathLike[str]) -> int | None:
+    """Training pairs that weights have seen, repeats counted, with all that they began with; None if no card says so.
+
+    Raises
+    ------
+    ValueError
+        The card beside the weights is damaged.
+    """
+    folder = find(name)
+    if folder is None or not (folder / CARD_FILE).is_file():
+        return None
+    card = read_json(folder / CARD_FILE)
+    told = card.get("visits") if isinstance(card, dict) else None
+    return told if isinstance(told, int) else None
+
+
+def visits_of(method: Any) -> int | None:
+    """Of the weights of a pipeline, or of a control of one: the most, where its stages differ; None without any."""
+    pipeline = getattr(method, "pipeline", method)
+    slots = (getattr(pipeline, slot, None) for slot in ("overlap", "match", "estimate"))
+    found = [visits(name) for name in map(_weights_of, slots) if name]
+    return max((each for each in found if each is not None), default=None)
 
 
 def require(slots: Mapping[str, Any], what: str) -> None:

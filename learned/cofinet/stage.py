@@ -42,6 +42,7 @@ class Cofinet(StackedStage):
     seed: int = 0
 
     kind: ClassVar[str] = "cofinet"
+    shipped: ClassVar[str] = "cofinet-small"
     gives: ClassVar[frozenset[str]] = frozenset({"matches", "group"})
 
     def __post_init__(self) -> None:

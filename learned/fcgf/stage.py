@@ -42,6 +42,7 @@ class Fcgf(NetworkStage):
     voxel: float | None = None
 
     kind: ClassVar[str] = "fcgf"
+    shipped: ClassVar[str] = "fcgf-small"
     gives: ClassVar[frozenset[str]] = frozenset({"matches"})
     parts: ClassVar[frozenset[str]] = frozenset({"encoder", "decoder"})
 

@@ -36,6 +36,7 @@ class OmNet(NetworkStage):
     points: int | None = None
 
     kind: ClassVar[str] = "omnet"
+    shipped: ClassVar[str] = "omnet-small"
     parts: ClassVar[frozenset[str]] = frozenset({"encoder", "fusion", "decoder", "regression"})
 
     def __post_init__(self) -> None:

@@ -26,6 +26,9 @@ from hybridreg.learned.pretrained import Pretrained
 from hybridreg.learned.pyramid.point_pyramid import Pyramid
 from hybridreg.learned.weights import load_official_tensors
 
+# Of the logarithm of the cross score's temperature, before training (models/architectures.py).
+_EPSILON = -5.0
+
 
 @dataclass(frozen=True, kw_only=True)
 class PredatorCloud:
@@ -77,7 +80,7 @@ class PredatorNetwork(Pretrained):
         super().__init__()
         self.config = config
         dim = config.graph.dim
-        self.epsilon = nn.Parameter(torch.tensor(-5.0))
+        self.epsilon = nn.Parameter(torch.tensor(_EPSILON))
         self.encoder = KpfcnnEncoder(config.backbone, seed)
         self.bottleneck = nn.Linear(config.backbone.coarse_dim, dim)
         self.graph = GraphNetwork(dim, config.graph.neighbors, config.graph.heads, config.graph.blocks)
@@ -154,7 +157,8 @@ class PredatorNetwork(Pretrained):
 
     def untrained(self) -> frozenset[str]:
         """All parts where no training step has touched the network: it has no normalisation weights to show it."""
-        made = bool((self.score.bias == 0).all())
+        # An instance norm hides the bias of the score from the losses: its gradient is rounding, and may be none.
+        made = bool((self.score.bias == 0).all()) and float(self.epsilon) == _EPSILON
         return frozenset(name for name, _ in self.named_children()) if made else frozenset()
 
     @classmethod

@@ -25,6 +25,7 @@ _FEWEST = 100
 @dataclass(frozen=True, kw_only=True)
 class _PredatorStage(StackedStage):
     kind: ClassVar[str] = "predator"
+    shipped: ClassVar[str] = "predator-small"
 
     def output(self, scene: Scene) -> PredatorOutput:
         """The network's output for a pair: computed once a run for all stages of the same network."""

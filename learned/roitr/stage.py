@@ -42,6 +42,7 @@ class Roitr(NetworkStage):
     min_overlap: float = 0.5
 
     kind: ClassVar[str] = "roitr"
+    shipped: ClassVar[str] = "roitr-small"
     gives: ClassVar[frozenset[str]] = frozenset({"matches", "group"})
     parts: ClassVar[frozenset[str]] = frozenset({"backbone", "transformer"})
 

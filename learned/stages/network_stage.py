@@ -9,6 +9,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
 
+from hybridreg.io import shipped_weights
 from hybridreg.runtime.threads import single
 from hybridreg.stage import Stage
 
@@ -29,7 +30,8 @@ class NetworkStage(Stage):
     ----------
     weights : str or None
         A folder that `save_pretrained` wrote, the name of weights that come with the package, or a checkpoint that
-        the network's authors published (`.pth`, `.tar`, `.pkl`). None means random weights.
+        the network's authors published (`.pth`, `.tar`, `.pkl`). Where none are named those of the package are taken
+        (``NAME-small``); with a ``size``, or ``untrained``, None means random weights.
     size : str or None
         Configuration by name (`hybridreg list networks`): of random weights ("nano" if not given), or of a checkpoint
         (found from its tensors if not given). Folders contain their own.
@@ -45,6 +47,8 @@ class NetworkStage(Stage):
     untrained: bool = False
 
     kind: ClassVar[str] = "cross3dreg"
+    # Weights of the package that the stage takes where neither weights nor a size are given.
+    shipped: ClassVar[str] = ""
     # Parts that must have been trained, and whether a network with random weights uses images.
     parts: ClassVar[frozenset[str]] = frozenset({"backbone"})
     image: ClassVar[bool] = False
@@ -52,6 +56,8 @@ class NetworkStage(Stage):
     def __post_init__(self) -> None:
         if self.weights is not None:
             object.__setattr__(self, "weights", os.fspath(self.weights))
+        elif self.size is None and not self.untrained and self.shipped in shipped_weights.names():
+            object.__setattr__(self, "weights", self.shipped)
         elif not self.untrained:
             raise ValueError(
                 f"{type(self).__name__}: without weights=... these weights are random; name a folder or weights "

@@ -14,6 +14,7 @@ import torch
 from hybridreg import __version__
 from hybridreg.data.dataset import fingerprint_of
 from hybridreg.io.atomic import write_text
+from hybridreg.io.shipped_weights import CARD_FILE, visits
 from hybridreg.learned.network_table import DEFAULT
 from hybridreg.learned.training.checkpoint import Progress
 from hybridreg.learned.training.curve_files import CurveFile
@@ -43,6 +44,7 @@ def make_card(
         "parameters": parameters,
         "estimator": "LGR" if recipe.kind == DEFAULT else estimator_of(recipe.kind),
         "steps": progress.total,
+        "visits": progress.visits + ((visits(recipe.start) if recipe.start else None) or 0),
         "hours": round(progress.seconds / 3600.0, 3),
         "seed": recipe.seed,
         "skipped": dict(progress.skipped),
@@ -55,7 +57,7 @@ def make_card(
 
 def write_card(folder: Path, card: Mapping[str, Any]) -> None:
     """Write ``card.json``, and ``card.md`` for reading."""
-    write_text(folder / "card.json", json.dumps(card, indent=1) + "\n")
+    write_text(folder / CARD_FILE, json.dumps(card, indent=1) + "\n")
     write_text(folder / "card.md", "\n".join(_lines(card)) + "\n")
 
 
@@ -76,7 +78,8 @@ def _lines(card: Mapping[str, Any]) -> list[str]:
         f"# {card['name']}",
         "",
         f"{card['parameters']:,} parameters; {card['steps']} steps in {card['hours']:.2f} h on {card['device']}, "
-        f"seed {card['seed']}, {sum(card['skipped'].values())} steps skipped.",
+        f"seed {card['seed']}, {sum(card['skipped'].values())} steps skipped. With all that it began with it has seen "
+        f"{card['visits']:,} pairs, repeats counted.",
         f"Trained on {data}.",
         f"hybridreg {card['hybridreg']}, torch {card['torch']}. The recipe is in `card.json`.",
         "",

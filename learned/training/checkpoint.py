@@ -28,6 +28,7 @@ class Progress:
     phase: int = 0
     step: int = 0  # finished optimiser steps of the phase
     total: int = 0  # of all phases
+    visits: int = 0  # pairs shown so far, skipped steps counted
     skipped: dict[str, int] = field(default_factory=dict)  # steps skipped, by pair
     seconds: float = 0.0  # of training, over all runs
     best: tuple[float, ...] = ()  # rank of the best validation

@@ -183,6 +183,7 @@ class Loop:
     def _note(self, outcome: StepOutcome, samples: PhaseSamples, numbers: range) -> None:
         self.progress.step += 1
         self.progress.total += 1
+        self.progress.visits += len(numbers)
         if outcome.stepped:
             return
         # A gradient that is not finite may come from any pair of the step.

@@ -79,6 +79,7 @@ class Phase:
     rate : peak learning rate
     warmup : steps over which the rate rises linearly from 0
     decay : "linear" to 0 at the end; "step" by ``decay_factor`` every ``decay_every`` steps (or epochs)
+    momentum : of "sgd", without dampening; the others have their own
     backbone_rate : factor on the rate of the backbone; 0 freezes it
     data : weights of sources by name, instead of their own; sources left out are not used
     accumulate : pairs of one optimiser step, over all processes together
@@ -93,7 +94,8 @@ class Phase:
     decay: Literal["linear", "step", "none"] = "none"
     decay_every: float = 0.0
     decay_factor: float = 0.95
-    optimizer: Literal["adamw", "adam"] = "adamw"
+    optimizer: Literal["adamw", "adam", "sgd"] = "adamw"
+    momentum: float = 0.9
     weight_decay: float = 1e-6
     losses: LossWeights = field(default_factory=LossWeights)
     backbone_rate: float = 1.0
@@ -108,6 +110,8 @@ class Phase:
             raise ValueError(f"phase {self.name!r}: decay='step' needs decay_every above 0")
         if self.accumulate < 1:
             raise ValueError(f"phase {self.name!r}: accumulate={self.accumulate} must be at least 1")
+        if not 0.0 <= self.momentum < 1.0:
+            raise ValueError(f"phase {self.name!r}: momentum={self.momentum} must be at least 0 and below 1")
 
 
 @dataclass(frozen=True, kw_only=True)

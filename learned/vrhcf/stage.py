@@ -56,6 +56,7 @@ class Vrhcf(NetworkStage):
     mutual: bool = False
 
     kind: ClassVar[str] = "vrhcf"
+    shipped: ClassVar[str] = "vrhcf-small"
     gives: ClassVar[frozenset[str]] = frozenset({"matches"})
     parts: ClassVar[frozenset[str]] = frozenset({"layers"})
 

@@ -215,6 +215,7 @@ def test_list_names_everything() -> None:
         "classical",
         "cross3dreg",
         "fcgf: fcgf-kitti, fcgf-3dmatch, small, nano",
+        "cross3dreg-small: 39,800 visits of training pairs",
     ):
         assert part in text
     presets = call("list", "presets").stdout
@@ -233,3 +234,4 @@ def test_doctor_tells_versions_and_survives_what_does_not_load(monkeypatch: pyte
     assert f"hybridreg {hr.__version__}" in result.stdout
     assert f"numpy {np.__version__}: does not load: libfoo.so.1" in result.stdout
     assert "GPU: unknown without torch" in result.stdout
+    assert "weights that come with the package: cofinet-small, cross3dreg-small, fcgf-small" in result.stdout

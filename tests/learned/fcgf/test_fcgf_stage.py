@@ -83,7 +83,7 @@ def test_a_mask_leaves_points_out_unless_too_few_remain(scene: Scene, trained: s
 
 def test_random_weights_are_refused_unless_asked_for(scene: Scene, tmp_path: Path) -> None:
     with pytest.raises(ValueError, match=r"Fcgf: without weights.*random.*untrained=True"):
-        hr.Fcgf()
+        hr.Fcgf(size="nano")
     FcgfNetwork(named_config("nano")).save_pretrained(tmp_path)
     with pytest.raises(ValueError, match="these weights are random: decoder, encoder of"):
         hr.Fcgf.from_pretrained(tmp_path)

@@ -109,7 +109,7 @@ def test_the_suite(check: testing.stages.Check, size: str) -> None:
 
 def test_random_weights_are_refused_unless_asked_for(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match=r"OmNet: without weights.*random.*untrained=True"):
-        hr.OmNet()
+        hr.OmNet(size="nano")
     OmnetNetwork(named_config("nano")).save_pretrained(tmp_path)
     with pytest.raises(ValueError, match="random: decoder, encoder, fusion, regression of"):
         hr.OmNet.from_pretrained(tmp_path)

@@ -58,7 +58,7 @@ def test_a_shifted_cloud_is_found_untrained(shifted: Pair) -> None:
 
 def test_random_weights_must_be_asked_for(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match=r"Roitr: .*these weights are random.*untrained=True"):
-        hr.Roitr()
+        hr.Roitr(size="nano")
     STAGE.save_pretrained(tmp_path)
     with pytest.raises(ValueError, match="these weights are random: backbone, transformer of"):
         hr.Roitr.from_pretrained(tmp_path)

@@ -7,6 +7,7 @@ import dataclasses
 import pickle
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ import torch
 
 import hybridreg as hr
 from hybridreg import testing
+from hybridreg.io import shipped_weights
 from hybridreg.learned.cross3dreg.network import RegistrationNetwork
 from hybridreg.learned.cross3dreg.sizes import named_config
 from hybridreg.learned.geotransformer.official_names import official_name
@@ -30,6 +32,27 @@ CROSS, PLAIN = named_config("nano", omp=True, vgam=True), named_config("nano")
 def test_no_weights_are_refused_at_once(cls: type[Stage]) -> None:
     with pytest.raises(ValueError, match=f"{cls.__name__}: .*these weights are random.*untrained=True"):
         cls()
+
+
+@pytest.mark.parametrize(
+    "cls", [hr.Fcgf, hr.Predator, hr.PredatorOverlap, hr.Cofinet, hr.OmNet, hr.Roitr, hr.Vrhcf]
+)
+def test_weights_of_the_package_are_taken_where_none_are_named(
+    cls: type[Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(shipped_weights, "_folder", lambda: tmp_path)
+    with pytest.raises(ValueError, match="these weights are random"):
+        cls()
+    for name in ("config.json", "model.safetensors"):
+        (tmp_path / f"{cls.kind}-small").mkdir(exist_ok=True)
+        (tmp_path / f"{cls.kind}-small" / name).touch()
+    assert cls().weights == f"{cls.kind}-small"
+    # Who asks for a size or for random weights gets what was asked for.
+    assert cls(untrained=True).weights is None
+    assert cls(untrained=True, size="nano").weights is None
+    assert cls(weights=str(tmp_path)).weights == str(tmp_path)
+    with pytest.raises(ValueError, match="these weights are random"):
+        cls(size="nano")
 
 
 def test_a_pipeline_of_random_weights_is_not_built() -> None:

@@ -3,16 +3,22 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import math
 import stat
+from pathlib import Path
 
 import pytest
 from training_runs import Run, log
 
 from hybridreg.data import open_dataset
 from hybridreg.data.dataset import fingerprint_of
-from hybridreg.learned.training import recipe_file
+from hybridreg.io import shipped_weights
+from hybridreg.learned.training import recipe_file, ship
+from hybridreg.learned.training.card import make_card
+from hybridreg.learned.training.checkpoint import Progress
+from hybridreg.learned.training.curve_files import CurveFile
 from hybridreg.learned.training.data.pair_source import open_source
 from hybridreg.learned.training.validation import Validation, rank, validate
 from hybridreg.learned.weights import from_pretrained
@@ -33,6 +39,27 @@ def test_the_figures_are_those_of_the_run(whole: Run) -> None:
     text = (whole.out / "best" / "card.md").read_text()
     for value in ("8 steps", "seed 3", card["validation"][0]["inlier_ratio"]):
         assert value in text
+
+
+@pytest.mark.parametrize("name", shipped_weights.names())
+def test_a_shipped_card_counts_the_visits_of_all_runs_before_it(name: str) -> None:
+    """A start is the folder of a run, named after its recipe."""
+
+    def chain(recipe: str) -> int:
+        read = recipe_file.read(recipe)
+        before = chain(Path(read.start).parent.name) if read.start else 0
+        return before + sum(phase.steps * phase.accumulate for phase in read.phase)
+
+    assert shipped_weights.visits(name) == chain(name)
+
+
+def test_a_run_counts_what_its_start_has_seen(whole: Run, tmp_path: Path) -> None:
+    start = ship.ship(whole.out / "best", tmp_path)
+    seen = shipped_weights.visits(start)
+    assert seen == 8
+    recipe = dataclasses.replace(whole.recipe, start=str(start))
+    card = make_card(recipe, Progress(visits=5), [], [], CurveFile(tmp_path / "none.csv", ()), 1, "CPU")
+    assert card["visits"] == 13
 
 
 def test_the_weights_on_disk_reach_the_figures_of_the_card(whole: Run) -> None:

@@ -80,7 +80,7 @@ def test_each_trains_validates_and_resumes(
     assert 0.0 <= float(validated["recall"]) <= 1.0
     assert (validated["inlier_ratio"] == "nan") == (name == "omnet")
     card = json.loads((whole / "best" / "card.json").read_text())
-    assert (card["recipe"]["kind"], card["skipped"]) == (name, {})
+    assert (card["recipe"]["kind"], card["skipped"], card["visits"]) == (name, {}, 8)
     assert recipe_file.build(type(recipe), card["recipe"], "card") == recipe
     # Once more, stopped in its second step.
     with monkeypatch.context() as patched:

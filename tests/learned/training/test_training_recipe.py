@@ -9,15 +9,17 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import torch
 from training_runs import MakeRecipe, write_recipe
 from typer.testing import CliRunner
 
 from hybridreg.cli.app import app
 from hybridreg.learned import recipes
+from hybridreg.learned.network_table import network_class
 from hybridreg.learned.training import recipe_file
 from hybridreg.learned.training.data import data_choice
 from hybridreg.learned.training.recipe import Phase
-from hybridreg.learned.training.schedule import rate_at, steps_of
+from hybridreg.learned.training.schedule import make_optimizer, rate_at, steps_of
 
 PHASE = {"name": "p", "steps": 2}
 
@@ -107,6 +109,46 @@ def test_the_paper_recipe_is_the_published_schedule() -> None:
     assert rate_at(phase, 3999, steps) == pytest.approx(1e-4)
     assert rate_at(phase, 4000, steps) == pytest.approx(0.95e-4)
     assert rate_at(phase, steps - 1, steps) == pytest.approx(1e-4 * 0.95**4)
+
+
+# Optimiser, momentum, and the rate's factor after the first epoch, as released.
+PUBLISHED = {
+    "fcgf-small": ("sgd", 0.8, 0.99),
+    "omnet-small": ("adam", None, 1.0),
+    "predator-small": ("sgd", 0.98, 0.99),
+    "cofinet-small": ("adam", None, 0.95),
+    "roitr-small": ("adam", None, 0.95),
+    "vrhcf-small": ("adam", None, 0.5),
+}
+
+
+@pytest.mark.parametrize("name", PUBLISHED)
+def test_the_networks_of_table_2_see_the_same_pairs_and_fall_as_published(name: str) -> None:
+    recipe, first = recipe_file.read(name), recipe_file.read("omnet-small")
+    assert (recipe.data, recipe.augmentation, recipe.seed) == (first.data, first.augmentation, first.seed)
+    assert recipe.augmentation.rotation == "yaw"
+    (phase,) = recipe.phase
+    assert (
+        phase.steps * phase.accumulate == 480 == 2 * sum(int(s.data.split("#")[1]) for s in recipe.data.train)
+    )
+    optimizer, momentum, factor = PUBLISHED[name]
+    assert phase.optimizer == optimizer
+    assert momentum is None or phase.momentum == momentum
+    epoch = phase.steps // 2
+    rates = [rate_at(phase, step, phase.steps) / phase.rate for step in (epoch - 1, epoch, 2 * epoch - 1)]
+    assert rates == pytest.approx([1.0, factor, factor])
+
+
+def test_sgd_has_its_momentum_and_a_wrong_one_is_refused() -> None:
+    network = network_class("fcgf").named("nano")
+    phase = Phase(name="p", steps=1, rate=0.1, optimizer="sgd", momentum=0.8, weight_decay=1e-4)
+    made = make_optimizer(phase, network)
+    assert isinstance(made, torch.optim.SGD)
+    (group,) = made.param_groups
+    assert (group["lr"], group["momentum"], group["weight_decay"]) == (0.1, 0.8, 1e-4)
+    for momentum in (-0.1, 1.0):
+        with pytest.raises(ValueError, match=f"momentum={momentum} must be"):
+            Phase(name="p", steps=1, momentum=momentum)
 
 
 def test_rates_rise_then_fall() -> None:

@@ -102,7 +102,7 @@ def test_released_and_right_matching_differ(shifted: Pair) -> None:
 
 def test_wrong_fields_and_weights_are_refused(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match=r"Vrhcf: .*these weights are random.*untrained=True"):
-        hr.Vrhcf()
+        hr.Vrhcf(size="nano")
     for fields, message in (
         ({"max_keypoints": 2}, "max_keypoints=2"),
         ({"matching": "rows"}, "matching='rows'"),
