@@ -158,7 +158,7 @@ class PredatorNetwork(Pretrained):
     def untrained(self) -> frozenset[str]:
         """All parts where no training step has touched the network: it has no normalisation weights to show it."""
         # An instance norm hides the bias of the score from the losses: its gradient is rounding, and may be none.
-        made = bool((self.score.bias == 0).all()) and float(self.epsilon) == _EPSILON
+        made = bool((self.score.bias == 0).all()) and self.epsilon.item() == _EPSILON
         return frozenset(name for name, _ in self.named_children()) if made else frozenset()
 
     @classmethod

@@ -102,15 +102,6 @@ def test_a_published_checkpoint_tells_its_configuration(indoor: PredatorNetwork,
     assert PredatorNetwork.load_official(tmp_path / "bare.pth", "predator-3dmatch").config == found.config
 
 
-@pytest.mark.parametrize("part", ["score.bias", "epsilon"])
-def test_either_sign_of_training_is_enough_in_half_precision_too(part: str, tmp_path: Path) -> None:
-    network = PredatorNetwork(named_config("nano"))
-    with torch.no_grad():
-        network.get_parameter(part).add_(2e-8 if part == "score.bias" else 0.004)
-    weights.save_pretrained(network, tmp_path, half=True)
-    assert not PredatorNetwork.from_pretrained(tmp_path).untrained()
-
-
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
@@ -135,3 +126,12 @@ def test_a_checkpoint_that_runs_code_is_refused(tmp_path: Path) -> None:
     torch.save({"state_dict": {"epsilon": Path("anything")}}, tmp_path / "object.pth")
     with pytest.raises(ValueError, match=r"object.pth"):
         PredatorNetwork.load_official(tmp_path / "object.pth")
+
+
+@pytest.mark.parametrize("part", ["score.bias", "epsilon"])
+def test_either_sign_of_training_is_enough_in_half_precision_too(part: str, tmp_path: Path) -> None:
+    network = PredatorNetwork(named_config("nano"))
+    with torch.no_grad():
+        network.get_parameter(part).add_(2e-8 if part == "score.bias" else 0.004)
+    weights.save_pretrained(network, tmp_path, half=True)
+    assert not PredatorNetwork.from_pretrained(tmp_path).untrained()
