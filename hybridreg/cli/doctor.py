@@ -40,13 +40,12 @@ _NEEDED = {
 def command() -> None:
     """Print versions, which libraries load, and whether there is a GPU."""
     import hybridreg
-    from hybridreg.io import shipped_weights
 
     print(f"hybridreg {hybridreg.__version__}, Python {platform.python_version()}, {platform.platform()}")
     for module, (distribution, purpose) in _NEEDED.items():
         print(f"  {distribution} {_installed(distribution)}: {_loads(module)} (for {purpose})")
     print(f"GPU: {_gpu()}")
-    print(f"weights that come with the package: {', '.join(shipped_weights.names()) or 'none'}")
+    print(f"weights that come with the package: {_weights()}")
     for line in (*_unloadable_stages(), *_unloadable_networks()):
         print(line)
 
@@ -79,6 +78,15 @@ def _gpu() -> str:
     if not torch.cuda.is_available():
         return "none that torch can use; learned stages run on the CPU"
     return ", ".join(torch.cuda.get_device_name(i) for i in range(torch.cuda.device_count()))
+
+
+def _weights() -> str:
+    from hybridreg.io import shipped_weights
+
+    try:
+        return ", ".join(shipped_weights.names()) or "none"
+    except Exception as error:  # as above: an installation without them must not hide the rest
+        return f"cannot be listed: {sentence(error)}"
 
 
 def _unloadable_stages() -> Iterator[str]:

@@ -234,4 +234,6 @@ def test_doctor_tells_versions_and_survives_what_does_not_load(monkeypatch: pyte
     assert f"hybridreg {hr.__version__}" in result.stdout
     assert f"numpy {np.__version__}: does not load: libfoo.so.1" in result.stdout
     assert "GPU: unknown without torch" in result.stdout
-    assert "weights that come with the package: cofinet-small, cross3dreg-small, fcgf-small" in result.stdout
+    assert "weights that come with the package: cannot be listed: libfoo.so.1" in result.stdout
+    monkeypatch.undo()
+    assert doctor._weights().startswith("cofinet-small, cross3dreg-small, fcgf-small, ")
