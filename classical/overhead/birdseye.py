@@ -20,7 +20,7 @@ from hybridreg.matches import Correspondences, Pose
 from hybridreg.resolution import map_cell
 from hybridreg.scene import Level, Scene, Side
 from hybridreg.search.hypothesis import Found, Hypothesis, as_pose
-from hybridreg.search.ranking import best, distinct
+from hybridreg.search.ranking import BEYOND_DOUBT, best, distinct
 from hybridreg.search.settle import best_first
 from hybridreg.stage import Stage
 
@@ -39,8 +39,7 @@ _SHARE = 0.5
 _LEVELLED = (0.5, 0.0)
 # The same in the second look; by hand.
 _WHITEN = (0.0, 0.75)
-# Peaks examined first; the others only where none of these is likely: of 200 pairs (`sim:val`, `sim:train`, hard kinds
-# with even seeds) 54 had a likely one that was not beyond doubt among them, and no later peak was right instead.
+# Peaks examined first; the others only where none of these is beyond doubt; by hand.
 _FIRST = 10
 # Log-odds of the best pose of the run below which no other spectrum finds the right one: of the pairs of `sim:val` and
 # `sim:train` that another spectrum solved, the best pose before had -3.3 at least.
@@ -132,9 +131,9 @@ class BirdsEye(Stage):
             poses = [
                 T_target_level @ M @ T_level_source for M in self._planar(source, target, voxel, levelled)
             ]
-            for some in (poses[:_FIRST], poses[_FIRST:]):
+            for some, plain in ((poses[:_FIRST], BEYOND_DOUBT), (poses[_FIRST:], NEARLY)):
                 found = best([*found, *best_first(scene, some)])
-                if found and found[0].log_odds >= NEARLY:
+                if found and found[0].log_odds >= plain:
                     return found
             if Found.of(scene).highest < _LOST:
                 return found

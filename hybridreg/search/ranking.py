@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybridreg.evidence import match_agreement, views
+from hybridreg.evidence.log_odds import NEARLY
 from hybridreg.geometry import se3
 from hybridreg.scene import Scene
 from hybridreg.search.hypothesis import Hypothesis
@@ -22,6 +23,8 @@ _TURNED = 5.0
 # Log-odds of the best of many starts, roughly settled, below which none of them is right. Of 172 pairs (`sim:val`,
 # `sim:train`, hard kinds with even seeds) the right one never had less than -2.8.
 HOPELESS = -4.0
+# Log-odds from which a pose is beyond doubt: twice those of "ok".
+BEYOND_DOUBT = 2.0 * NEARLY
 # Log-odds below the best pose's from which closeness no longer decides: by hand.
 _CONTENDS = 8.0
 
