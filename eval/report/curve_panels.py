@@ -3,8 +3,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -16,7 +14,7 @@ from hybridreg.eval.score import curves, errors
 from hybridreg.eval.score.protocols import Protocol
 from hybridreg.eval.scored_table import Entry
 from hybridreg.io import write_text
-from hybridreg.io.csv_cells import cell
+from hybridreg.io.csv_cells import csv_text
 
 # As the paper calls them; other estimators go by their own names.
 _TITLES = {"lgr": "LGR", "ransac-50k": "RANSAC-50K", "svd": "weighted SVD", "ransac": "our RANSAC"}
@@ -53,11 +51,9 @@ def write(folder: str | os.PathLike[str], entries: Sequence[Entry], protocol: Pr
     )
     for row in grid:
         row[0].set_ylabel("recall, %")
-    text = io.StringIO()
-    csv.writer(text, lineterminator="\n").writerows([[cell(value) for value in line] for line in lines])
     table = Path(folder) / "curves.csv"
     files = [*save_both(figure, folder, "curves"), table]
-    write_text(table, text.getvalue())
+    write_text(table, csv_text(lines))
     return files
 
 

@@ -3,9 +3,7 @@
 
 from __future__ import annotations
 
-import csv
 import dataclasses
-import io
 from collections.abc import Sequence
 
 from hybridreg.eval.report import table_columns
@@ -15,7 +13,7 @@ from hybridreg.eval.score import differences
 from hybridreg.eval.score.protocols import Protocol
 from hybridreg.eval.score.scoring import scene_of
 from hybridreg.eval.scored_table import Table
-from hybridreg.io.csv_cells import cell
+from hybridreg.io.csv_cells import csv_text
 
 _LATEX = {"\\": r"\textbackslash{}", "°": r"$^\circ$", "–": "--"} | {c: f"\\{c}" for c in "&%$#_{}"}
 _LATEX |= {
@@ -148,9 +146,5 @@ def table_csv(table: Table, protocols: Sequence[Protocol]) -> str:
                 | {f"seconds {stage}": value for stage, value in seconds.items()}
             )
     lines.extend({"method": name, "data": table.data, "not run": why} for name, why in table.problems.items())
-    text = io.StringIO()
     head = list(dict.fromkeys(key for line in lines for key in line))
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow([cell(key) for key in head])
-    writer.writerows([cell(line.get(key, "")) for key in head] for line in lines)
-    return text.getvalue()
+    return csv_text([head, *([line.get(key, "") for key in head] for line in lines)])

@@ -3,7 +3,10 @@
 
 from __future__ import annotations
 
-from typing import TypeVar
+import csv
+import io
+from collections.abc import Iterable
+from typing import Any, TypeVar
 
 Value = TypeVar("Value")
 
@@ -23,3 +26,10 @@ def cell(value: Value) -> Value | str:
     except ValueError:
         return f"'{value}"
     return value
+
+
+def csv_text(rows: Iterable[Iterable[Any]]) -> str:
+    """A CSV file of these rows, each value as `cell` makes it."""
+    text = io.StringIO()
+    csv.writer(text, lineterminator="\n").writerows([cell(value) for value in row] for row in rows)
+    return text.getvalue()

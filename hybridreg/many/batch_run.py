@@ -3,8 +3,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import json
 import os
 from collections.abc import Callable, Mapping, Sequence
@@ -18,12 +16,13 @@ import numpy as np
 from hybridreg import changes
 from hybridreg.cloud import PointCloud
 from hybridreg.io.atomic import write_text
-from hybridreg.io.csv_cells import cell
-from hybridreg.io.line_file import LineFile, cut, whole_lines
+from hybridreg.io.csv_cells import csv_text
+from hybridreg.io.line_file import LineFile
 from hybridreg.io.lock import folder_lock
 from hybridreg.many.jobs import Job
+from hybridreg.many.kept_rows import kept
 from hybridreg.many.target import Target
-from hybridreg.output.pose_text import quaternion
+from hybridreg.output.pose_text import position_and_quaternion
 from hybridreg.pair import Pair
 from hybridreg.pipeline import Pipeline
 from hybridreg.runtime.workers import spread
@@ -111,23 +110,13 @@ def _key(job: Job) -> tuple[str, str, str]:
 
 
 def _read(path: Path, settings: Row) -> dict[tuple[str, str, str], Row]:
-    if not path.is_file():
-        return {}
-    try:
-        lines, length = whole_lines(path)
-        if not lines:
-            return {}
-        header, *rows = (json.loads(line) for line in lines)
-        found = {(row["id"], row["source"], row["target"]): row for row in rows if not row["error"]}
-    except (ValueError, TypeError, KeyError) as error:
-        raise ValueError(f"{path}: damaged ({error}); add --overwrite to make it anew") from error
-    if header != json.loads(json.dumps(settings)):
-        raise ValueError(
-            f"{path}: was made with other settings; add --overwrite to make it anew, or choose another --out"
-        )
-    cut(path, length)
-    if len(found) < len(rows):
-        write_text(path, "".join(json.dumps(each) + "\n" for each in (header, *found.values())))
+    def parse(rows: list[Row]) -> tuple[dict[tuple[str, str, str], Row], int]:
+        return {(row["id"], row["source"], row["target"]): row for row in rows if not row["error"]}, len(rows)
+
+    found, n = kept(path, settings, parse) or ({}, 0)
+    if len(found) < n:
+        lines = (settings, *found.values())
+        write_text(path, "".join(json.dumps(each) + "\n" for each in lines))
     return found
 
 
@@ -176,15 +165,11 @@ def _one(job: Job, settings: str) -> Row:
 
 
 def _table(rows: Sequence[Row]) -> str:
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(_COLUMNS)
+    lines: list[Sequence[str]] = [_COLUMNS]
     for row in rows:
-        pose: list[Any] = [""] * 7
-        if row["T_target_source"] is not None:
-            T = np.array(row["T_target_source"])
-            pose = [repr(float(x)) for x in (*T[:3, 3], *quaternion(T[:3, :3]))]
+        T = row["T_target_source"]
+        pose = [""] * 7 if T is None else position_and_quaternion(np.array(T))
         why = row["error"] or "; ".join(row["reasons"])
-        told = (row["id"], row["source"], row["target"], row["verdict"], f"{row['confidence']:.3f}", *pose)
-        writer.writerow([cell(each) for each in (*told, f"{row['seconds']:.3f}", why)])
-    return text.getvalue()
+        told = (row["id"], row["source"], row["target"], row["verdict"], f"{row['confidence']:.3f}")
+        lines.append((*told, *pose, f"{row['seconds']:.3f}", why))
+    return csv_text(lines)

@@ -11,7 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from hybridreg.io.line_file import LineFile, cut, whole_lines
+from hybridreg.io.line_file import LineFile
+from hybridreg.many.kept_rows import kept
 from hybridreg.many.link_search import Key
 from hybridreg.many.links import Link
 
@@ -46,7 +47,7 @@ class LinkFile(dict[Key, Link]):
         super().__init__()
         self._on_link = on_link
         self._looks = [_looks(file) for file in files]
-        held = not overwrite and path.is_file() and self._read(path, json.loads(json.dumps(settings)))
+        held = not overwrite and kept(path, settings, self._take)
         self._file = LineFile(path, anew=not held)
         if not held:
             self._file.add(json.dumps(settings))
@@ -69,34 +70,22 @@ class LinkFile(dict[Key, Link]):
         """Close the file."""
         self._file.close()
 
-    def _read(self, path: Path, settings: Any) -> bool:
+    def _take(self, rows: list[Any]) -> bool:
         row_of = {look: row for row, look in enumerate(self._looks)}
-        try:
-            lines, length = whole_lines(path)
-            if not lines:
-                return False
-            header, *rows = (json.loads(line) for line in lines)
-            for row in rows:
-                a, b = (row_of.get(look) for look in row["clouds"])
-                if a is None or b is None or a > b:
-                    continue
-                start = None if row["start"] is None else tuple(map(float, row["start"]))
-                link = Link(
-                    source=b,
-                    target=a,
-                    T_target_source=np.array(row["T_target_source"], dtype=np.float64).reshape(4, 4),
-                    verdict=str(row["verdict"]),
-                    confidence=float(row["confidence"]),
-                    metres=float(row["metres"]),
-                )
-                super().__setitem__((a, b, start), link)
-        except (ValueError, TypeError, KeyError) as error:
-            raise ValueError(f"{path}: damaged ({error}); add --overwrite to make it anew") from error
-        if header != settings:
-            raise ValueError(
-                f"{path}: was made with other settings; add --overwrite to make it anew, or choose another --out"
+        for row in rows:
+            a, b = (row_of.get(look) for look in row["clouds"])
+            if a is None or b is None or a > b:
+                continue
+            start = None if row["start"] is None else tuple(map(float, row["start"]))
+            link = Link(
+                source=b,
+                target=a,
+                T_target_source=np.array(row["T_target_source"], dtype=np.float64).reshape(4, 4),
+                verdict=str(row["verdict"]),
+                confidence=float(row["confidence"]),
+                metres=float(row["metres"]),
             )
-        cut(path, length)
+            super().__setitem__((a, b, start), link)
         return True
 
 

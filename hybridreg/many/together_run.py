@@ -3,9 +3,7 @@
 
 from __future__ import annotations
 
-import csv
 import glob
-import io
 import os
 import re
 from collections.abc import Callable, Mapping, Sequence
@@ -20,14 +18,14 @@ from hybridreg.cloud import PointCloud
 from hybridreg.geometry import se3
 from hybridreg.io import write_points
 from hybridreg.io.atomic import write_text
-from hybridreg.io.csv_cells import cell
+from hybridreg.io.csv_cells import csv_text
 from hybridreg.io.lock import folder_lock
 from hybridreg.io.write import write_json
 from hybridreg.many.alignment import Alignment
 from hybridreg.many.link_file import LinkFile
 from hybridreg.many.link_search import aligned
 from hybridreg.output.pose_files import pose_files
-from hybridreg.output.pose_text import quaternion
+from hybridreg.output.pose_text import position_and_quaternion
 
 _LINKS, _TABLE, _ROLES, _ALL = "links.jsonl", "poses.csv", "links.csv", "alignment.json"
 
@@ -128,9 +126,8 @@ def run(
         write_text(folder / _TABLE, _table(found, files))
         write_text(folder / _ROLES, _roles(found))
         write_json(folder / _ALL, found.to_dict())
-        for stale in (folder / "poses").glob(
-            "*.txt"
-        ):  # a cloud that was placed by an earlier run may not be now
+        # A cloud that an earlier run placed may not be placed now.
+        for stale in (folder / "poses").glob("*.txt"):
             stale.unlink()
         for name, text in pose_files(names, found.poses, row, form).items():
             (folder / name).parent.mkdir(exist_ok=True)
@@ -172,11 +169,11 @@ def _table(found: Alignment, files: Sequence[str]) -> str:
     used = [link for link in found.links if link.role in ("tree", "loop")]
     rows = [["id", "file", "placed", "links", "x", "y", "z", "qx", "qy", "qz", "qw", "why"]]
     for row, (name, T, placed) in enumerate(zip(found.names, found.poses, found.placed, strict=True)):
-        pose = [repr(float(x)) for x in (*T[:3, 3], *quaternion(T[:3, :3]))] if placed else [""] * 7
+        pose = position_and_quaternion(T) if placed else [""] * 7
         count = sum(row in (link.source, link.target) for link in used)
         why = "; ".join(reason for reason in found.reasons if reason.startswith(f"{name} "))
         rows.append([name, files[row], "yes" if placed else "no", str(count), *pose, why])
-    return _csv(rows)
+    return csv_text(rows)
 
 
 def _roles(found: Alignment) -> str:
@@ -184,10 +181,4 @@ def _roles(found: Alignment) -> str:
     for link in found.links:
         pair = found.names[link.source], found.names[link.target]
         rows.append([*pair, link.verdict, f"{link.confidence:.3f}", link.role])
-    return _csv(rows)
-
-
-def _csv(rows: Sequence[Sequence[str]]) -> str:
-    text = io.StringIO()
-    csv.writer(text, lineterminator="\n").writerows([cell(each) for each in row] for row in rows)
-    return text.getvalue()
+    return csv_text(rows)

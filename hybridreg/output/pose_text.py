@@ -30,18 +30,23 @@ def roll_pitch_yaw(R: Array) -> Array:
     )
 
 
+def position_and_quaternion(T: Array) -> list[str]:
+    """x y z qx qy qz qw of a pose (4, 4), each so that it is read back to the last bit."""
+    return [repr(float(value)) for value in (*T[:3, 3], *quaternion(T[:3, :3]))]
+
+
 def _matrix(T: Array) -> str:
     return "\n".join(_words(row) for row in T)
 
 
 def _quaternion(T: Array) -> str:
-    return _words([*T[:3, 3], *quaternion(T[:3, :3])])
+    return " ".join(position_and_quaternion(T))
 
 
 def _ros_tf(T: Array) -> str:
     names = ("x", "y", "z", "qx", "qy", "qz", "qw")
-    values = (*T[:3, 3], *quaternion(T[:3, :3]))
-    numbers = " ".join(f"--{name} {float(value)!r}" for name, value in zip(names, values, strict=True))
+    values = position_and_quaternion(T)
+    numbers = " ".join(f"--{name} {value}" for name, value in zip(names, values, strict=True))
     return f"ros2 run tf2_ros static_transform_publisher {numbers} --frame-id target --child-frame-id source"
 
 
