@@ -151,6 +151,20 @@ def both(text: str | None, option: str) -> tuple[str, str]:
     return source.strip(), target.strip()
 
 
+def check_cloud_file(path: Path | None) -> None:
+    """Refuse a file that no cloud is written to, before the work and not after it."""
+    if path is not None and path.suffix.lower() not in (".ply", ".pcd"):
+        raise ValueError(f"{path}: clouds are written as .ply or .pcd; choose such a name")
+
+
+def check_form(form: str) -> None:
+    """Refuse a form that no pose is written in."""
+    from hybridreg.output.pose_text import FORMATS
+
+    if form not in FORMATS:
+        raise ValueError(f"--format {form}: a pose is written as {', '.join(FORMATS)}")
+
+
 def viewpoint(text: str, option: str) -> Any:
     """The viewpoint for `PointCloud.of` from `x,y,z`, `none` or `auto`."""
     if text in ("auto", "none"):

@@ -64,16 +64,12 @@ def command(
     """Align two point clouds; print the pose, the verdict on it, and the seconds of each stage."""
     from hybridreg.changes import build
     from hybridreg.cloud import PointCloud
-    from hybridreg.io.point_files import holds_several
-    from hybridreg.io.recorded.recording import ANY, Selection
-    from hybridreg.output.pose_text import FORMATS
+    from hybridreg.io.point_files import selection_for
     from hybridreg.pair import Pair
 
-    if form not in FORMATS:
-        raise ValueError(f"--format {form}: a pose is written as {', '.join(FORMATS)}")
+    options.check_form(form)
     for path in (aligned, merged):
-        if path is not None and path.suffix.lower() not in (".ply", ".pcd"):
-            raise ValueError(f"{path}: clouds are written as .ply or .pcd; choose such a name")
+        options.check_cloud_file(path)
     source_sensor, target_sensor = options.both(sensors, "--sensors")
     changes = options.changes_of(preset, pipeline, settings, voxel)
     known = options.prior(init, max_translation, max_rotation, gravity, crop, crop_source, scale)
@@ -88,7 +84,7 @@ def command(
             name=name,
             nonfinite=missing,
             viewpoint=options.viewpoint(place, f"--{name}-viewpoint"),
-            select=Selection(**choice) if holds_several(path) else ANY,
+            select=selection_for(path, choice),
         )
         for name, path, place, choice in zip(
             ("source", "target"), (source, target), (source_viewpoint, target_viewpoint), select, strict=True

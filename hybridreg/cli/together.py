@@ -44,12 +44,9 @@ def command(
     from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
     from hybridreg.many.together_run import files_of, run
-    from hybridreg.output.pose_text import FORMATS
 
-    if form not in FORMATS:
-        raise ValueError(f"--format {form}: a pose is written as {', '.join(FORMATS)}")
-    if merged is not None and merged.suffix.lower() not in (".ply", ".pcd"):
-        raise ValueError(f"{merged}: clouds are written as .ply or .pcd; choose such a name")
+    options.check_form(form)
+    options.check_cloud_file(merged)
     files = files_of(what)
     columns = (
         SpinnerColumn(),

@@ -13,7 +13,8 @@ from hybridreg.cli.terminal.error_messages import plainly
 
 # Points of a cloud that a phone turns without stuttering: a page of 2 MB.
 _POINTS = 100_000
-# By how much R R^T of a pose may be off that was typed with two decimals; as `hybridreg.prior`.
+# By how much R R^T of a pose may be off that was typed with two decimals: a little more than of one that is searched
+# around (`hybridreg.prior`), as it is only looked at.
 _ROUNDED = 0.05
 
 
@@ -40,9 +41,8 @@ def command(
     from hybridreg.eval.report import orbit_view
     from hybridreg.geometry import se3
     from hybridreg.io import write_text
-    from hybridreg.io.point_files import holds_several
+    from hybridreg.io.point_files import selection_for
     from hybridreg.io.pose_file import read_pose
-    from hybridreg.io.recorded.recording import ANY, Selection
     from hybridreg.pair import Pair
     from hybridreg.prior.placing import sized
 
@@ -50,13 +50,10 @@ def command(
         raise ValueError(f"--out {out}: the view is a page; choose a name such as {out.stem or 'view'}.html")
     T = np.eye(4)
     if pose is not None:
-        T = se3.check(read_pose(pose), str(pose), tolerance=_ROUNDED)
-        T = se3.from_rt(se3.project(T[:3, :3]), T[:3, 3])
+        T = se3.rounded(read_pose(pose), str(pose), _ROUNDED)
     select = options.selections(topic, index, at, accumulate)
     moving, still = (
-        PointCloud.of(
-            path, name=name, nonfinite="drop", select=Selection(**choice) if holds_several(path) else ANY
-        )
+        PointCloud.of(path, name=name, nonfinite="drop", select=selection_for(path, choice))
         for name, path, choice in zip(("source", "target"), (source, target), select, strict=True)
     )
     pair = Pair.of(sized(moving, _scale(pose)), still)

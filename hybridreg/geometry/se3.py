@@ -9,6 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+# R R^T of a rotation in double precision is off by less.
+_EXACT = 1e-12
 
 
 def from_rt(R: Array, t: Array) -> Array:
@@ -130,6 +132,15 @@ def check(T: Any, name: str = "T", tolerance: float = 1e-4) -> Array:
             f"determinant {determinant:.3g}); remove scale or reflection"
         )
     return matrix
+
+
+def rounded(T: Any, name: str, tolerance: float) -> Array:
+    """As `check` of a matrix that was written down with few digits: a rotation that is off by up to `tolerance` is made
+    exact unless it is so already."""
+    matrix = check(T, name, tolerance)
+    R = matrix[:3, :3]
+    exact = np.abs(R @ R.T - np.eye(3)).max() <= _EXACT
+    return matrix if exact else from_rt(project(R), matrix[:3, 3])
 
 
 def turn_to_z(up: Array) -> Array:

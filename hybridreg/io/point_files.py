@@ -4,8 +4,9 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -149,6 +150,11 @@ def _is_folder(path: Path) -> bool:
 def holds_several(path: str | os.PathLike[str]) -> bool:
     """Whether a file may hold several clouds, to choose from by a `Selection`."""
     return _suffix(os.fspath(path)) in _SEVERAL or _is_folder(Path(path))
+
+
+def selection_for(path: str | os.PathLike[str], choice: Mapping[str, Any]) -> Selection:
+    """A choice made for every file, as it concerns this one: none where it holds one cloud alone."""
+    return Selection(**choice) if holds_several(path) else ANY
 
 
 def read_viewpoint(path: str | os.PathLike[str]) -> NDArray[np.float64] | None:

@@ -19,9 +19,8 @@ from hybridreg.pair import Pair
 from hybridreg.prior import placing, size_search
 
 Array = NDArray[np.float64]
-# A start is often written down with two digits: a rotation that is off by less is meant as one, and is made exact
-# unless it is so already.
-_ROUNDED, _EXACT = 0.03, 1e-12
+# A start is often written down with two digits: a rotation whose R R^T is off by less is meant as one.
+_ROUNDED = 0.03
 _Z = np.array([0.0, 0.0, 1.0])
 
 
@@ -65,11 +64,8 @@ class Prior:
     def __post_init__(self) -> None:
         init = read_pose(self.init) if isinstance(self.init, (str, os.PathLike)) else self.init
         if init is not None:
-            T = se3.check(init, "init", tolerance=_ROUNDED)
             # Nested tuples, so that two of them can be compared and written to TOML.
-            off = np.abs(T[:3, :3] @ T[:3, :3].T - np.eye(3)).max()
-            T = se3.from_rt(se3.project(T[:3, :3]), T[:3, 3]) if off > _EXACT else T
-            object.__setattr__(self, "init", _nested(T))
+            object.__setattr__(self, "init", _nested(se3.rounded(init, "init", _ROUNDED)))
         for name in ("max_translation", "max_rotation"):
             value = getattr(self, name)
             if value is not None and not (_is_number(value) and value > 0.0):
