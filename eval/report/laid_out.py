@@ -16,12 +16,15 @@ from hybridreg.frames import lower_pose
 from hybridreg.geometry import se3
 from hybridreg.pair import Pair
 from hybridreg.prior.placing import sized
+from hybridreg.resolution import Tolerance
 from hybridreg.result import RegistrationResult
 
 Array = NDArray[np.float64]
 
 # Points drawn of each cloud: a page of them stays below a megabyte.
 DRAWN = 16_000
+# Of the target, of source points without a surface of the target near by, and of the source as it came.
+TARGET, ALONE, BEFORE = "#8f99a8", "#c9b458", "#a6761d"
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -78,6 +81,11 @@ def of(pair: Pair, result: RegistrationResult) -> LaidOut:
         },
         rivals=np.array([lower_pose(rival, pair) @ back for rival in result.rivals]).reshape(-1, 4, 4),
     )
+
+
+def reddest(allowed: Tolerance) -> float:
+    """Metres at which the colours of residuals end: half of those within which a pose is right."""
+    return 0.5 * allowed.metres
 
 
 def residuals(points: Array, surfaces: Surfaces) -> Array:

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from hybridreg.eval.report import page
+from hybridreg.eval.report import laid_out, page
 from hybridreg.eval.report.laid_out import residuals, thinned
 from hybridreg.evidence.surface_distance import FineSurfaces
 from hybridreg.frames import lower_pose
@@ -109,12 +109,12 @@ def pair_page(pair: Pair, T: Array, title: str, drawn: int) -> str:
     source, target = (thinned(cloud.points, drawn) for cloud in (pair.source, pair.target))
     lowered = lower_pose(T, pair)
     moved = se3.apply(lowered, source)
-    most = 0.5 * tolerance(pair.source, pair.target).metres
+    most = laid_out.reddest(tolerance(pair.source, pair.target))
     shade = residuals(moved, FineSurfaces.of(pair).target) / most
     layers = [
-        Layer("target", target, "#8f99a8"),
-        Layer("source", moved, "#c9b458", shade=shade),
-        Layer("source as it came", source, "#a6761d", shown=False),
+        Layer("target", target, laid_out.TARGET),
+        Layer("source", moved, laid_out.ALONE, shade=shade),
+        Layer("source as it came", source, laid_out.BEFORE, shown=False),
     ]
     words = (
         f"The source is coloured by its distance to the target's surfaces, blue 0 to red {most:g} m and more; sand "

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybridreg.eval.report.cloud_pictures import new_figure, window
-from hybridreg.eval.report.laid_out import LaidOut
+from hybridreg.eval.report.laid_out import ALONE, TARGET, LaidOut
 from hybridreg.geometry import se3
 
 if TYPE_CHECKING:
@@ -28,10 +28,8 @@ Array = NDArray[np.float64]
 _INCHES = (5.0, 4.8)
 _STRIP = (5.0, 3.1)  # of a side view
 _INK = "#808080"  # grey, on white as on black
-_TARGET = "#8f99a8"  # bluish grey
 _SOURCE = "#d95f02"  # orange
 _THROUGH = "#e7298a"  # pink
-_ALONE = "#c9b458"  # of source points without a surface near by
 _MOST_RIVALS = 3
 # Lengths of the axes that are drawn: from above x and y, from the side x and z.
 _ABOVE, _SIDE = (0, 1), (0, 2)
@@ -45,7 +43,7 @@ def residual_pictures(laid: LaidOut, most: float) -> Iterator[str]:
         figure = new_figure(_INCHES if axes == _ABOVE else _STRIP)
         panel = _panel(figure, laid, axes, laid.source)
         alone = ~np.isfinite(laid.residual)
-        _dots(panel, laid.source[alone][:, axes], _ALONE, 1.0)
+        _dots(panel, laid.source[alone][:, axes], ALONE, 1.0)
         order = np.argsort(laid.residual[~alone])  # the largest on top
         points, residual = laid.source[~alone][order], laid.residual[~alone][order]
         drawn = panel.scatter(
@@ -96,7 +94,7 @@ def rival_pictures(laid: LaidOut, words: list[str]) -> Iterator[str]:
 
 def _panel(figure: Figure, laid: LaidOut, axes: tuple[int, int], framed: Array) -> Any:
     panel = figure.subplots()
-    _dots(panel, laid.target[:, axes], _TARGET, 0.8)
+    _dots(panel, laid.target[:, axes], TARGET, 0.8)
     low, high = window(framed[:, axes])
     if axes == _SIDE:  # a side view is a strip: as high as the points are
         heights = np.quantile(framed[:, 2], [0.005, 0.995])

@@ -33,9 +33,6 @@ from hybridreg.prior.placing import sized
 from hybridreg.result import RegistrationResult
 from hybridreg.runtime import optional_packages
 
-# Half the metres within which a pose is right is where the colours of residuals end.
-_REDDEST = 0.5
-
 
 class Origin(NamedTuple):
     """Where a registration came from, for the reader of its page: free text, may be empty.
@@ -158,7 +155,7 @@ def _matrix(result: RegistrationResult) -> str:
 
 
 def _pictures(pair: Pair, result: RegistrationResult, laid: LaidOut) -> Iterator[str]:
-    most = _REDDEST * result.tolerance.metres
+    most = laid_out.reddest(result.tolerance)
     yield page.heading("Overlay and free space")
     yield page.panels([*pose_pictures.residual_pictures(laid, most), pose_pictures.violation_picture(laid)])
     yield page.paragraph(
@@ -193,9 +190,9 @@ def _layers(result: RegistrationResult, laid: LaidOut, most: float) -> list[orbi
         for k, T in enumerate(laid.rivals[:3])
     ]
     return [
-        layer("target", laid.target, "#8f99a8"),
-        layer("source at the pose, by residual", laid.source, "#c9b458", shade=laid.residual / most),
-        layer("source before", laid.before, "#a6761d", shown=False),
+        layer("target", laid.target, laid_out.TARGET),
+        layer("source at the pose, by residual", laid.source, laid_out.ALONE, shade=laid.residual / most),
+        layer("source before", laid.before, laid_out.BEFORE, shown=False),
         layer("free-space violations", laid.violations, "#e7298a", shown=False, size=6),
         *rivals,
     ]

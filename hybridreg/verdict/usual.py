@@ -15,9 +15,8 @@ from importlib.resources import files
 from typing import NamedTuple
 
 from hybridreg.evidence.evidence import NO_RIVAL, Evidence
+from hybridreg.verdict.words import FEW
 
-# Points or cells below which a share or a correlation of them says nothing: as in the reasons (words.FEW); by hand.
-_FEW = 60.0
 # The shares of right poses whose numbers are kept.
 LEVELS = (0.01, 0.05, 0.25, 0.5, 0.75, 0.95, 0.99)
 # Whether a larger number speaks for a pose (+1) or against it (-1).
@@ -66,7 +65,7 @@ def facts(evidence: Mapping[str, float]) -> dict[str, float]:
     told["overlap"] = max(evidence["visible_source"], evidence["visible_target"])
     told["lead"] = -evidence["rival_margin"]
     measured = {
-        "relief_correlation": evidence["relief_cells"] >= _FEW,
+        "relief_correlation": evidence["relief_cells"] >= FEW,
         "matched": evidence["matched"] > 0.0,
         "lead": evidence["rival_margin"] > NO_RIVAL,
     }

@@ -55,7 +55,6 @@ class Cofinet(StackedStage):
             raise ValueError(f"seed={self.seed} must not be negative")
 
     def __call__(self, scene: Scene, overlap: Overlap) -> Correspondences:
-
         from hybridreg.learned.stages.drawing import draw
         from hybridreg.learned.stages.tensor_values import array
 

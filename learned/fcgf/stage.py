@@ -52,7 +52,6 @@ class Fcgf(NetworkStage):
             raise ValueError(f"min_overlap={self.min_overlap} must lie in [0, 1]")
 
     def __call__(self, scene: Scene, overlap: Overlap) -> Correspondences:
-
         from hybridreg.learned.fcgf.batch import make_batch
         from hybridreg.learned.memory_estimate import require_bytes
         from hybridreg.learned.stages.network_grid import note_grid

@@ -45,7 +45,6 @@ class OmNet(NetworkStage):
             raise ValueError(f"points={self.points} must be at least 1")
 
     def __call__(self, scene: Scene, matches: Correspondences, rng: np.random.Generator) -> Pose:
-
         from hybridreg.learned.memory_estimate import require_bytes
         from hybridreg.learned.omnet.batch import make_batch
         from hybridreg.learned.stages.tensor_values import array

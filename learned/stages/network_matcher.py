@@ -82,7 +82,6 @@ class NetworkMatcher(NetworkStage):
         return replace(self, filtered=False) if self.filtered and active else None
 
     def __call__(self, scene: Scene, overlap: Overlap) -> Correspondences:
-
         from hybridreg.learned.stages.encoding import encode
         from hybridreg.learned.stages.kept_superpoints import keep
 

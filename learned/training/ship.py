@@ -12,9 +12,10 @@ from pathlib import Path
 
 import hybridreg.learned
 from hybridreg.io.atomic import write_text
+from hybridreg.io.shipped_weights import CARD_FILE
 from hybridreg.learned.weights import from_pretrained, save_pretrained
 
-CARDS = ("card.json", "card.md")
+CARDS = (CARD_FILE, "card.md")
 # All weights of the wheel together, bytes.
 MOST = 40_000_000
 
