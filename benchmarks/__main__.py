@@ -8,7 +8,7 @@ import subprocess
 import sys
 
 # Each in its own process, so that none measures what another left in memory.
-AGAINST_PEERS = ("voxel", "nearest", "ransac", "peers")
+AGAINST_PEERS = ("voxel_speed", "nearest_speed", "ransac_speed", "peers")
 
 
 def main() -> int:

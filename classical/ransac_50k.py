@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybridreg.geometry import se3
+from hybridreg.geometry.consensus import Consensus
 from hybridreg.geometry.kabsch import STATUSES, kabsch_batch
 from hybridreg.matches import Correspondences, Pose
 from hybridreg.runtime.threads import single
@@ -19,9 +20,11 @@ from hybridreg.stage import Stage
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
-# Samples fitted together, and poses whose matches are counted together: the fastest of 500, 5,000 and 50,000.
+# Samples fitted together: the fastest of 500, 5,000 and 50,000.
 _BATCH = 5_000
 _SIZE = 4
+# Matches by which a count in single precision may be off: poses this near the best are counted again in double.
+_ROUNDING = 1
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -56,30 +59,28 @@ class Ransac50k(Stage):
         source, target = matches.source[finite], matches.target[finite]
         if len(source) < _SIZE:
             return Pose.unknown(len(matches))
-        best, T = (0, 0.0), np.eye(4)
         with single():
-            for start in range(0, self.iterations, _BATCH):
-                rows = rng.integers(0, len(source), (min(_BATCH, self.iterations - start), _SIZE))
-                fits = kabsch_batch(source[rows], target[rows])
-                poses = fits.T[fits.status == STATUSES.index("ok")]
-                for block in np.array_split(poses, max(1, len(poses) * len(source) // 2**22 + 1)):
-                    best, T = self._better(best, T, block, source, target)
-        if best[0] < 3:
+            consensus = Consensus(source, target, np.ones(len(source)), self.max_distance)
+            poses, counts = self._likeliest(consensus, rng)
+            supports = [consensus.support(T) for T in poses[counts >= counts.max(initial=0) - _ROUNDING]]
+        # Open3D's order: more inliers, and among as many the smaller error; of equals the first.
+        best = max(supports, key=lambda one: (one.n_inliers, one.score), default=None)
+        if best is None or best.n_inliers < 3:
             return Pose.unknown(len(matches))
-        inliers = np.linalg.norm(se3.apply(T, matches.source) - matches.target, axis=1) < self.max_distance
-        return Pose(T, inliers=inliers)
+        inliers = (
+            np.linalg.norm(se3.apply(best.T, matches.source) - matches.target, axis=1) < self.max_distance
+        )
+        return Pose(best.T, inliers=inliers)
 
-    def _better(
-        self, best: tuple[int, float], T: Array, poses: Array, source: Array, target: Array
-    ) -> tuple[tuple[int, float], Array]:
-        # Open3D's order: more inliers, and among as many the smaller error.
-        if not len(poses):
-            return best, T
-        moved = np.einsum("bij,kj->bki", poses[:, :3, :3], source, optimize=True) + poses[:, None, :3, 3]
-        squared = np.square(moved - target).sum(axis=2)
-        agree = squared < self.max_distance**2
-        counts = agree.sum(axis=1)
-        errors = np.where(agree, squared, 0.0).sum(axis=1) / np.maximum(counts, 1)
-        first = int(np.lexsort((errors, -counts))[0])
-        found = (int(counts[first]), -float(errors[first]))
-        return (found, poses[first]) if found > best else (best, T)
+    def _likeliest(self, consensus: Consensus, rng: np.random.Generator) -> tuple[Array, Indices]:
+        """Poses of samples, and how many matches agree with each: those that could still be the best."""
+        poses, counts = np.empty((0, 4, 4)), np.empty(0, dtype=np.int64)
+        for start in range(0, self.iterations, _BATCH):
+            rows = rng.integers(0, len(consensus), (min(_BATCH, self.iterations - start), _SIZE))
+            fits = kabsch_batch(consensus.source[rows], consensus.target[rows])
+            new = fits.T[fits.status == STATUSES.index("ok")]
+            poses = np.concatenate([poses, new])
+            counts = np.concatenate([counts, consensus.counts(new)])
+            hopeful = counts >= counts.max(initial=0) - _ROUNDING
+            poses, counts = poses[hopeful], counts[hopeful]
+        return poses, counts

@@ -190,9 +190,7 @@ def _build(changed: Mapping[str, Any]) -> Pipeline | Control:
     oracle, image = changed.get("oracle", ""), changed.get("image", True)
     if oracle not in ("", "overlap"):
         raise ValueError(f"oracle = {oracle!r}: only 'overlap' can be taken from the ground truth")
-    if not isinstance(image, bool):
-        raise ValueError(f"image = {image!r}: expected true or false")
-    if image and not oracle:
+    if image is True and not oracle:
         return pipeline
     return Control(pipeline=pipeline, oracle=bool(oracle), image=image)
 

@@ -52,7 +52,7 @@ def redraw(
             continue
         folder = Path(out) / slug(entry.name)
         for name in [row.id for row in entry.rows if row.error is None and row.id in ids][:n]:
-            written += _draw(rerun(entry.name, control, pairs[ids.index(name)], table.seed), protocol, folder)
+            written += _draw(rerun(entry.name, control, pairs, ids.index(name), table.seed), protocol, folder)
     return written
 
 
@@ -69,7 +69,7 @@ def control_of(entry: Entry) -> Control | None:
     if not set(SLOTS) <= set(spec):
         return None
     pipeline = Pipeline(**{slot: spec[slot] for slot in SLOTS})
-    told = value_of(Mapping[str, bool], spec.get("control", {}), f"{entry.name}: control")
+    told = value_of(Mapping[str, Any], spec.get("control", {}), f"{entry.name}: control")
     unknown = set(told) - {"oracle", "image"}
     if unknown:
         raise ValueError(f"{entry.name}: no control is called {', '.join(sorted(unknown))}")
@@ -86,10 +86,10 @@ class Rerun(NamedTuple):
     threshold: float
 
 
-def rerun(method: str, control: Control, labelled: LabelledPair, seed: int) -> Rerun:
+def rerun(method: str, control: Control, pairs: Sequence[LabelledPair], index: int, seed: int) -> Rerun:
     """Run a method on a pair once more."""
-    pipeline, pair = control.told(labelled)
-    truth = lower_pose(labelled.T_target_source, pair)
+    pipeline, pair = control.told(pairs, index)
+    truth = lower_pose(pairs[index].T_target_source, pair)
     return Rerun(method, pair.id, pipeline.trace(pair, seed=seed), truth, mask_threshold(pipeline.match))
 
 

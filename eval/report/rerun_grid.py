@@ -88,4 +88,4 @@ def _rerun(
         if control is None:
             continue
         for name in names:
-            yield rerun(entry.name, control, pairs[ids.index(name)], seed)._replace(pair=name)
+            yield rerun(entry.name, control, pairs, ids.index(name), seed)._replace(pair=name)

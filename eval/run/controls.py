@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Controls of an ablation: a pipeline that gets the true overlap, or that does not get the image.
+"""Controls of an ablation: a pipeline that gets the true overlap, or another image than the pair's, or none.
 
 The true pose stays within the evaluator: `predict` gives the labelled pair to the control, which returns a pipeline
 for this one pair. The stage that uses the true pose is not registered, so no pipeline file can name it.
@@ -8,8 +8,9 @@ for this one pair. The stage that uses the true pose is not registered, so no pi
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,23 +36,34 @@ class Control:
     Attributes
     ----------
     oracle : replace its overlap stage by the true overlap
-    image : let it use the camera image
+    image : the camera image that it gets: the pair's (True), none (False), or the next pair's ("other")
     """
 
     pipeline: Pipeline
     oracle: bool = False
-    image: bool = True
+    image: bool | Literal["other"] = True
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.oracle, bool):
+            raise ValueError(f"oracle = {self.oracle!r}: expected true or false")
+        if not (isinstance(self.image, bool) or self.image == "other"):
+            raise ValueError(f"image = {self.image!r}: expected true, false or 'other'")
 
     def to_spec(self) -> dict[str, Any]:
         """The pipeline's tables, and what the control does to it."""
         return {**self.pipeline.to_spec(), "control": {"oracle": self.oracle, "image": self.image}}
 
-    def told(self, labelled: LabelledPair) -> tuple[Pipeline, Pair]:
-        """The pipeline for this pair, and the pair as the pipeline may see it."""
+    def told(self, pairs: Sequence[LabelledPair], index: int) -> tuple[Pipeline, Pair]:
+        """The pipeline for one of the pairs, and the pair as the pipeline may see it."""
+        labelled = pairs[index]
         pipeline, pair = self.pipeline, labelled.pair
         if self.oracle:
             pipeline = pipeline.swap(overlap=TrueOverlap(T=lower_pose(labelled.T_target_source, pair)))
-        return pipeline, pair if self.image else dataclasses.replace(pair, image=None)
+        if self.image == "other":
+            pair = dataclasses.replace(pair, image=pairs[(index + 1) % len(pairs)].pair.image)
+        elif not self.image:
+            pair = dataclasses.replace(pair, image=None)
+        return pipeline, pair
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

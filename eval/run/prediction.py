@@ -139,7 +139,10 @@ def predict_pair(
             raise
         except Exception as error:
             return Row(index=index, id=name, error=one_line(error))
-        told, pair = method.told(labelled) if isinstance(method, Control) else (method, labelled.pair)
+        try:
+            told, pair = method.told(pairs, index) if isinstance(method, Control) else (method, labelled.pair)
+        except Exception as error:  # the other pair's image may be what cannot be read
+            return Row(index=index, id=name, error=one_line(error))
         tried = attempt(told, pair, seed)
         try:
             return truth.row(index, labelled, tried, match=getattr(told, "match", None))

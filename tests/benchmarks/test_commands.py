@@ -10,6 +10,8 @@ from pathlib import Path
 
 import pytest
 
+from benchmarks.__main__ import AGAINST_PEERS
+
 ROOT = Path(__file__).resolve().parents[2]
 SCRIPTS = [
     p for p in sorted((ROOT / "benchmarks").glob("*.py")) if "__main__" in p.read_text(encoding="utf-8")
@@ -31,6 +33,10 @@ def test_pages_name_commands_that_exist(page: Path) -> None:
     assert "python benchmarks/" not in text
     named = set(re.findall(r"python -m benchmarks\.([a-z_]+)", text))
     assert named <= {script.stem for script in SCRIPTS}
+
+
+def test_those_that_run_together_exist() -> None:
+    assert set(AGAINST_PEERS) <= {script.stem for script in SCRIPTS}
 
 
 def test_a_checkout_alone_is_enough() -> None:

@@ -48,7 +48,7 @@ PIPE = hr.Pipeline(voxel=0.5, match=Watching(), estimate="identity", refine="non
 
 def test_the_oracle_mask_is_the_overlap_under_the_truth() -> None:
     labelled = Yards().load(0)
-    pipeline, pair = Control(pipeline=PIPE, oracle=True).told(labelled)
+    pipeline, pair = Control(pipeline=PIPE, oracle=True).told([labelled], 0)
     scene = pipeline.downsample(pair)
     found = pipeline.overlap(scene)
     moved = se3.apply(labelled.T_target_source, scene.source.points)
@@ -77,8 +77,25 @@ def test_a_withheld_image_is_not_there(tmp_path: Path) -> None:
     assert any(note.startswith("sees an image") for note in seeing.notes)
 
 
+def test_another_pairs_image_is_the_next_ones() -> None:
+    first, second = (LabelledPair(pair=dataclasses.replace(Yards().load(0).pair, image=np.full((8, 8, 3), k, np.uint8)),
+                                  T_target_source=np.eye(4)) for k in (10, 20))  # fmt: skip
+    control = Control(pipeline=PIPE, image="other")
+    for index, shown in ((0, second), (1, first)):
+        _, pair = control.told([first, second], index)
+        assert np.array_equal(pair.image, shown.pair.image)
+        assert np.array_equal(pair.source.points, [first, second][index].pair.source.points)
+    assert control.to_spec()["control"]["image"] == "other"
+
+
+@pytest.mark.parametrize("image", ["others", 1, None])
+def test_an_image_is_the_pairs_or_none_or_anothers(image: object) -> None:
+    with pytest.raises(ValueError, match="image = .*expected true, false or 'other'"):
+        Control(pipeline=PIPE, image=image)  # type: ignore[arg-type]
+
+
 def test_the_truth_cannot_be_named_in_a_pipeline_file(tmp_path: Path) -> None:
-    told, _ = Control(pipeline=hr.Pipeline(**STILL), oracle=True).told(Yards().load(0))
+    told, _ = Control(pipeline=hr.Pipeline(**STILL), oracle=True).told(Yards(), 0)
     assert isinstance(told.overlap, TrueOverlap)
     with pytest.raises(ValueError, match="not registered"):
         told.save(tmp_path / "p.toml")
@@ -117,7 +134,7 @@ def test_rows_of_a_file_become_controls_and_are_marked(tmp_path: Path) -> None:
     ("row", "told"),
     [
         ({"oracle": "pose"}, "oracle = 'pose': only 'overlap'"),
-        ({"image": 0}, "image = 0: expected true or false"),
+        ({"image": 0}, "image = 0: expected true, false or"),
     ],
 )
 def test_other_controls_are_refused(row: dict[str, object], told: str) -> None:
