@@ -80,6 +80,7 @@ def main() -> None:
     parser.add_argument("--pairs", nargs="*", default=[], help="names of pairs; all without")
     parser.add_argument("--rounds", type=int, default=3)
     options = parser.parse_args()
+    ratios: dict[str, list[float]] = {name: [] for name in PEERS}
     for labelled in real_pairs(options.data, options.pairs):
         scene = hr.VoxelGrid()(labelled.pair)
         a, b = (hr.Fpfh().features(scene, side) for side in ("source", "target"))
@@ -90,11 +91,17 @@ def main() -> None:
         found = {tuple(row) for row in timed["ours"].result}
         print(f"{labelled.pair.id}: {len(a)} x {len(b)}, ours {1e3 * taken['ours']:.0f} ms")
         for name in PEERS:
+            ratios[name].append(taken["ours"] / taken[name])
             theirs = {tuple(row) for row in timed[name].result}
             print(
                 f"  {name:18s} {1e3 * taken[name]:6.0f} ms, ours / theirs {taken['ours'] / taken[name]:.2f}, "
                 f"agree {len(found & theirs) / len(theirs):.3f}",
                 flush=True,
+            )
+    for name, values in ratios.items():
+        if values:
+            print(
+                f"ours / {name}: median {np.median(values):.2f}, worst {max(values):.2f}, {len(values)} pairs"
             )
 
 

@@ -141,6 +141,7 @@ def test_a_strangers_pickle_runs_nothing(tree: tuple[Path, Any], tmp_path: Path)
         (gzip.compress(pickle.dumps({"x": 1})), "no pandas DataFrame"),
         (b"\x80\x04K\x01.", "gzip"),
     ],
+    ids=["empty", "cut", "text", "another type", "not compressed"],
 )
 def test_damaged_frames_are_named(content: bytes, words: str, tmp_path: Path) -> None:
     file = tmp_path / "07.pkl.gz"

@@ -118,7 +118,7 @@ def note(folder: Path, **changes: object) -> Path:
 
 @posix
 @pytest.mark.usefixtures("without_locks")
-@pytest.mark.parametrize(("pid", "start"), [(2**22 + 1, ""), (os.getpid(), "1")])
+@pytest.mark.parametrize(("pid", "start"), [(2**22 + 1, ""), (os.getpid(), "1")], ids=["gone", "reused"])
 def test_where_there_are_no_locks_a_process_that_is_gone_is_taken_over(
     tmp_path: Path, pid: int, start: str
 ) -> None:
