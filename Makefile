@@ -19,7 +19,7 @@ demo: install
 	$(BIN)/python -m hybridreg demo --out out/demo
 
 test: install
-	OMP_NUM_THREADS=2 $(BIN)/python -m pytest -q
+	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -q -n 2 --dist loadfile
 
 # What a plain `pip install hybridreg` gives: the wheel in an environment of its own, without torch and open3d.
 light:

@@ -118,6 +118,7 @@ def test_threads_that_overlap_give_nothing_back_too_early_and_all_at_last() -> N
     seen = []
 
     def first() -> None:
+        torch.set_num_threads(2)  # a new thread begins with what OMP_NUM_THREADS says
         with one_thread():
             first_is_in.set()
             assert second_is_in.wait(10)
