@@ -11,7 +11,7 @@ from hybridreg.geometry.viewpoint import Given
 from hybridreg.io.recorded.recording import Selection
 from hybridreg.pair import Pair
 from hybridreg.pipeline import Pipeline
-from hybridreg.presets import DEFAULT
+from hybridreg.presets import DEFAULT, names
 from hybridreg.prior.prior import Prior
 from hybridreg.result import RegistrationResult
 
@@ -115,6 +115,10 @@ def register(
     KeyError
         For a preset that does not exist.
     """
+    if isinstance(image, str) and image in names():
+        raise ValueError(f"image: {image!r} is the name of a preset; give it as preset={image!r}")
+    if isinstance(preset, Pipeline):
+        raise ValueError("preset: takes a name; a pipeline of your own is called: pipe(source, target)")
     pipeline = Pipeline.preset(preset, voxel=voxel)
     prior = Prior(
         init=init,

@@ -22,6 +22,13 @@ from hybridreg.io.camera_image import CameraImage
 Array = NDArray[np.float64]
 Gravity = Literal["known", "unknown"]
 
+# Rows and columns of a grey image, at least: a pose or points in its place would pass for a small one.
+_FEWEST_PIXELS = 8
+_ELSEWHERE = (
+    "a rough pose is given as init=, a preset by its name as preset=, and a pipeline of your own is called: "
+    "pipe(source, target)"
+)
+
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Pair:
@@ -125,6 +132,12 @@ def _image(image: Any) -> Any:
     from hybridreg.io import as_image, check_image
 
     if not isinstance(image, (str, os.PathLike)):
+        if not hasattr(image, "__array__") and not isinstance(image, (list, tuple)):
+            raise ValueError(f"image: is a {type(image).__name__}, no array and no path; {_ELSEWHERE}")
+        shape = np.shape(image)
+        if len(shape) == 2 and 0 < min(shape) < _FEWEST_PIXELS:
+            size = " x ".join(map(str, shape))
+            raise ValueError(f"image: an array of {size} is no camera image; {_ELSEWHERE}")
         return as_image(image)
     check_image(image)
     return Path(image)
