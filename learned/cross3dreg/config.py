@@ -186,7 +186,7 @@ class MatchingConfig:
     matching_radius: float = 0.5  # metres
     patch_points: int = 128
     sinkhorn_iterations: int = 100
-    sinkhorn_form: Literal["log", "kernel"] = "kernel"  # at inference; training uses the log form
+    sinkhorn_form: Literal["log", "kernel"] = "kernel"  # at inference; training uses "kernel"
     score_scale: Literal["sqrt", "dim"] = "sqrt"
     topk: int = 2
     mutual: bool = True

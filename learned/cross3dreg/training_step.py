@@ -61,7 +61,7 @@ def fine_loss(
     # The noise of the augmentation may have moved the only point of a patch into another one.
     owning = encoding.target.patches.occupied[target] & encoding.source.patches.occupied[source]
     pairs = network.pair_up(encoding, target[owning], source[owning])
-    assignment = network.assign(encoding, pairs, "log", config.training_sinkhorn_iterations)
+    assignment = network.assign(encoding, pairs, "kernel", config.training_sinkhorn_iterations)
     points = (encoding.target.points, encoding.source.points)
     return assignment_loss(assignment, pairs, *points, targets.transform, config.positive_radius)
 

@@ -7,7 +7,7 @@ from torch import Tensor, nn
 
 from hybridreg.learned.cross3dreg.config import TransformerConfig
 from hybridreg.learned.geotransformer.structure_embedding import StructureEmbedding
-from hybridreg.learned.layers.attention import AttentionLayer
+from hybridreg.learned.layers.attention import AttentionLayer, Structure
 
 
 class GeoTransformerBlock(nn.Module):
@@ -32,9 +32,9 @@ class GeoTransformerBlock(nn.Module):
     ) -> tuple[Tensor, Tensor]:
         """Features (m, d), (n, d) at positions (m, 3), (n, 3) to (m, out), (n, out)."""
         # All self layers share one embedding a cloud: it is the largest tensor of the network.
-        structures: tuple[Tensor | None, Tensor | None] = (None, None)
+        structures: tuple[Tensor | Structure | None, ...] = (None, None)
         if self.embedding is not None:
-            structures = (self.embedding(target_points), self.embedding(source_points))
+            structures = (self.embedding.table(target_points), self.embedding.table(source_points))
         for kind, layer in zip(self.kinds, self.layers, strict=True):
             if kind == "self":
                 target = layer(target, target, structures[0])

@@ -4,9 +4,17 @@
 from __future__ import annotations
 
 import math
+from typing import Protocol
 
 import torch
 from torch import Tensor, nn
+
+
+class Structure(Protocol):
+    """An embedding (n, m, d) of pairs, of which only products are wanted."""
+
+    def products(self, vectors: Tensor) -> Tensor:
+        """(n, h, d) to (h, n, m)."""
 
 
 def split_heads(features: Tensor, heads: int) -> Tensor:
@@ -35,7 +43,11 @@ class Attention(nn.Module):
         self.structure = nn.Linear(dim, dim) if geometric else None
 
     def forward(
-        self, features: Tensor, memory: Tensor, structure: Tensor | None = None, values: Tensor | None = None
+        self,
+        features: Tensor,
+        memory: Tensor,
+        structure: Tensor | Structure | None = None,
+        values: Tensor | None = None,
     ) -> Tensor:
         """(n, d) attends to (m, d); ``structure`` is (n, m, d), ``values`` (m, d) replaces the memory's."""
         query = split_heads(self.query(features), self.heads)
@@ -47,7 +59,7 @@ class Attention(nn.Module):
         value = self.value(memory if values is None else values)
         return merge_heads(weights @ split_heads(value, self.heads))
 
-    def _structure_scores(self, query: Tensor, structure: Tensor) -> Tensor:
+    def _structure_scores(self, query: Tensor, structure: Tensor | Structure) -> Tensor:
         # q . (W r + b) = (q W) . r + q . b: projecting the n queries of each head instead of the n * m embeddings
         # saves a factor of d / h in multiplications and an (n, m, d) tensor.
         assert self.structure is not None
@@ -55,7 +67,9 @@ class Attention(nn.Module):
         weight = self.structure.weight.view(heads, width, -1)
         projected = (query @ weight).transpose(0, 1)  # (n, h, d)
         constant = (query * self.structure.bias.view(heads, 1, width)).sum(2, keepdim=True)  # (h, n, 1)
-        return (projected @ structure.transpose(1, 2)).transpose(0, 1) + constant
+        if isinstance(structure, Tensor):
+            return (projected @ structure.transpose(1, 2)).transpose(0, 1) + constant
+        return structure.products(projected) + constant
 
 
 class AttentionLayer(nn.Module):
@@ -68,7 +82,9 @@ class AttentionLayer(nn.Module):
         self.norm = nn.LayerNorm(dim)
         self.feed_forward = FeedForward(dim)
 
-    def forward(self, features: Tensor, memory: Tensor, structure: Tensor | None = None) -> Tensor:
+    def forward(
+        self, features: Tensor, memory: Tensor, structure: Tensor | Structure | None = None
+    ) -> Tensor:
         """(n, d), (m, d) to (n, d)."""
         attended = self.linear(self.attention(features, memory, structure))
         return self.feed_forward(self.norm(attended + features))

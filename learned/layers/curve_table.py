@@ -20,17 +20,16 @@ def sample_positions(highest: float, like: Tensor) -> Tensor:
 
 def interpolate(samples: Tensor, values: Tensor) -> Tensor:
     """The curve (n, d), sampled at `sample_positions`, at ``values`` (...): (..., d)."""
-    steps = values.flatten() * _DENSITY
+    index, weight = between(values.flatten())
+    starts = torch.arange(0, index.numel(), index.shape[1], device=index.device)
+    return Bags(index.flatten(), weight.flatten(), starts, len(samples)).sum(samples).view(*values.shape, -1)
+
+
+def between(values: Tensor) -> tuple[Tensor, Tensor]:
+    """Which four samples (n, 4) a curve at ``values`` (n,) is interpolated from, and their weights (n, 4)."""
+    steps = values * _DENSITY
     cell = steps.floor()
-    t = steps - cell
-    index = cell.long()[:, None] + torch.arange(4, device=values.device)
-    bags = Bags(
-        index.flatten(),
-        _cubic_weights(t).flatten(),
-        torch.arange(0, index.numel(), 4, device=index.device),
-        len(samples),
-    )
-    return bags.sum(samples).view(*values.shape, -1)
+    return cell.long()[:, None] + torch.arange(4, device=values.device), _cubic_weights(steps - cell)
 
 
 def _cubic_weights(t: Tensor) -> Tensor:

@@ -57,4 +57,5 @@ class _Sum(torch.autograd.Function):
 
     @staticmethod
     def backward(ctx: Any, gradient: Tensor) -> tuple[Tensor, None]:
-        return ctx.bags.transposed.sum_detached(gradient), None
+        # Rows in one piece: of others torch sums at half the speed.
+        return ctx.bags.transposed.sum_detached(gradient.contiguous()), None

@@ -44,7 +44,7 @@ class OptimalTransport(nn.Module):
 
 
 def log_sinkhorn(scores: Tensor, rows: Tensor, columns: Tensor, alpha: Tensor, iterations: int) -> Tensor:
-    """The log-domain iteration: slow, safe for any scores, and used in training."""
+    """The log-domain iteration: slow, and safe for any scores."""
     padded = _with_slack(scores, rows, columns, alpha)
     log_mu, log_nu, norm = _log_marginals(rows, columns, scores.dtype)
     u, v = torch.zeros_like(log_mu), torch.zeros_like(log_nu)

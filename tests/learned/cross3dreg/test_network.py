@@ -181,6 +181,37 @@ def test_structure_is_unchanged_by_motion_and_chunks(monkeypatch: pytest.MonkeyP
     assert torch.allclose(whole, embedding(points), atol=1e-12)
 
 
+def test_products_with_structure_from_curves_alone_equal_those_with_every_vector() -> None:
+    torch.manual_seed(1)
+    embedding = StructureEmbedding(32, 4.0, 15.0, 1)
+    points = torch.from_numpy(street(5, 30)).float()
+    vectors = torch.randn(len(points), 4, 32)
+    found = {}
+    for form, structure in {"vectors": embedding(points), "curves": embedding.table(points)}.items():
+        embedding.zero_grad()
+        asked = vectors.clone().requires_grad_()
+        products = (
+            (asked @ structure.transpose(1, 2)).transpose(0, 1)
+            if isinstance(structure, torch.Tensor)
+            else structure.products(asked)
+        )
+        assert products.shape == (4, len(points), len(points))
+        products.square().mean().backward()
+        gradients = [asked.grad, *(parameter.grad for parameter in embedding.parameters())]
+        found[form] = [products.detach(), *gradients]
+    for one, other in zip(*found.values(), strict=True):
+        assert torch.allclose(one, other, rtol=1e-4, atol=1e-5 * float(one.abs().max()))
+
+
+@pytest.mark.parametrize(("angle_k", "n"), [(3, 9), (1, 1)])
+def test_where_products_do_not_suffice_structure_is_made_of_vectors(angle_k: int, n: int) -> None:
+    embedding = StructureEmbedding(16, 4.0, 15.0, angle_k)
+    points = torch.rand(n, 3)
+    table = embedding.table(points)
+    assert isinstance(table, torch.Tensor)
+    assert torch.equal(table, embedding(points))
+
+
 @pytest.mark.parametrize("n", [1, 2, 3])
 def test_structure_of_few_superpoints(n: int) -> None:
     embedding = StructureEmbedding(16, 4.0, 15.0, 3)

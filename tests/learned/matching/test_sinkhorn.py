@@ -50,6 +50,39 @@ def test_the_log_form_steps_in_for_single_pairs() -> None:
     assert (kernel_sinkhorn(scores, rows, columns, ALPHA, 50).exp() - exact).abs().max() < 1e-4
 
 
+def gradients(solve, scores: torch.Tensor, *rest, dtype: torch.dtype) -> tuple[torch.Tensor, torch.Tensor]:  # type: ignore[no-untyped-def]
+    """Of a loss of log-assignments of valid entries, as in training, by the scores and by the slack."""
+    rows, columns, iterations = rest
+    scores, alpha = (given.detach().clone().to(dtype).requires_grad_() for given in (scores, ALPHA))
+    valid = rows[:, :, None] & columns[:, None]
+    out = solve(scores, rows, columns, alpha, iterations)
+    (out[:, :-1, :-1][valid][::3].sum() + out[:, :-1, -1][rows].mean()).backward()
+    assert scores.grad is not None
+    assert alpha.grad is not None
+    return scores.grad.double(), alpha.grad.double()
+
+
+@pytest.mark.parametrize("spread", [0.5, 10.0, 60.0])
+@pytest.mark.parametrize("iterations", [2, 10, 60])
+def test_both_forms_have_the_same_gradient(spread: float, iterations: int) -> None:
+    scores, rows, columns = problem(7, spread)
+    exact = gradients(log_sinkhorn, scores, rows, columns, iterations, dtype=torch.float64)
+    fast = gradients(kernel_sinkhorn, scores, rows, columns, iterations, dtype=torch.float32)
+    for a, b in zip(exact, fast, strict=True):
+        assert (a - b).abs().max() < 1e-3 * a.abs().max().clamp_min(1.0)
+
+
+def test_a_pair_that_the_log_form_steps_in_for_has_its_gradient_too() -> None:
+    scores, rows, columns = problem(3, 4.0)
+    rows, columns = torch.ones_like(rows), torch.ones_like(columns)
+    scores[2, 0, 0] = 900.0
+    exact = gradients(log_sinkhorn, scores, rows, columns, 10, dtype=torch.float64)
+    fast = gradients(kernel_sinkhorn, scores, rows, columns, 10, dtype=torch.float32)
+    for a, b in zip(exact, fast, strict=True):
+        assert torch.isfinite(b).all()
+        assert (a - b).abs().max() < 1e-3 * a.abs().max().clamp_min(1.0)
+
+
 def test_settled_potentials_stop_the_iteration(monkeypatch: pytest.MonkeyPatch) -> None:
     scores, rows, columns = problem(4, 2.0)
     products = []
