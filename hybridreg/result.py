@@ -167,11 +167,12 @@ class RegistrationResult:
         return result_words.html(self)
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain numbers, lists and strings; the per-point arrays become their counts."""
+        """Plain numbers, lists and strings; the per-point arrays become their counts. `hybridreg` is the version."""
         left_out = {"overlay", "matches"}
         plain = {f.name: _plain(getattr(self, f.name)) for f in fields(self) if f.name not in left_out}
         plain |= {name: getattr(self, name) for name in _MEASURED}
-        return {**plain, "n_correspondences": len(self.correspondence_set), "n_matches": len(self.matches)}
+        counts = {"n_correspondences": len(self.correspondence_set), "n_matches": len(self.matches)}
+        return {**plain, **counts, "hybridreg": _version()}
 
     def to_json(self) -> str:
         """`to_dict` as JSON text."""
@@ -189,6 +190,12 @@ class RegistrationResult:
             raise ValueError(
                 f"{os.fspath(path)}: a result is saved as .json (everything) or .txt (the 4x4 matrix)"
             )
+
+
+def _version() -> str:
+    from hybridreg import __version__
+
+    return __version__
 
 
 def _plain(value: Any) -> Any:

@@ -26,7 +26,7 @@ from hybridreg.eval.report.laid_out import LaidOut
 from hybridreg.eval.report.table_columns import Cells, number
 from hybridreg.frames import lower_pose
 from hybridreg.geometry import se3
-from hybridreg.io import write_text
+from hybridreg.io import write_json, write_text
 from hybridreg.output import result_words
 from hybridreg.pair import Pair
 from hybridreg.prior.placing import sized
@@ -52,7 +52,7 @@ class Origin(NamedTuple):
 def write(
     pair: Pair, result: RegistrationResult, out: str | os.PathLike[str], origin: Origin | None = None
 ) -> list[Path]:
-    """Write `T_target_source.txt`, `result.json`, `report.html` and `before_after.png` into a folder.
+    """Write `T_target_source.txt`, `result.json` (with `origin`), `report.html` and `before_after.png` into a folder.
 
     Warns
     -----
@@ -62,7 +62,7 @@ def write(
     folder = Path(out)
     folder.mkdir(parents=True, exist_ok=True)
     result.save(folder / "T_target_source.txt")
-    result.save(folder / "result.json")
+    write_json(folder / "result.json", {**result.to_dict(), **({"origin": origin._asdict()} if origin else {})})
     moving = sized(pair.source, result.scale)
     T = lower_pose(result.transformation, pair.replaced(source=moving))
     drawn = {

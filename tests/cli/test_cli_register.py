@@ -106,6 +106,9 @@ def test_out_gets_pose_result_page_and_picture_even_when_it_failed(
         "T_target_source.txt", "before_after.png", "report.html", "result.json",
     ]  # fmt: skip
     stored = json.loads((out / "result.json").read_text())
+    assert stored["hybridreg"] == hr.__version__
+    assert stored["origin"]["source"].endswith("a.npy")
+    assert stored["origin"]["command"].startswith("hybridreg register ")
     assert np.allclose(np.loadtxt(out / "T_target_source.txt"), stored["transformation"], atol=1e-9)
     assert (stored["verdict"], stored["seed"], stored["spec"]["refine"]["stage"]) == ("failed", 9, "icp")
     page = (out / "report.html").read_text()
