@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""`hybridreg list`: the names of stages, presets, data sets, tables, protocols, recipes, networks and weights."""
+"""`hybridreg list`: the names of stages, presets, data sets, tables, protocols, recipes, networks and weights; and what
+one of them is."""
 
 from __future__ import annotations
 
@@ -25,10 +26,19 @@ class Kind(str, Enum):
     weights = "weights"
 
 
+_KINDS = tuple(kind.value for kind in Kind)
+_WHAT = f"{', '.join(_KINDS)} (all of them if not given), or a stage or a preset by its name."
+
+
 @plainly
-def command(kind: Annotated[Kind | None, typer.Argument(help="All kinds if not given.")] = None) -> None:
-    """List stages, presets, data sets, tables, protocols, training recipes, networks and shipped weights."""
-    for each in Kind if kind is None else [kind]:
+def command(what: Annotated[str | None, typer.Argument(help=_WHAT)] = None) -> None:
+    """List what comes with the library, or tell what a stage or a preset does and which fields it has."""
+    if what is not None and what not in _KINDS:
+        from hybridreg.cli.about_names import about
+
+        print(about(what))
+        return
+    for each in Kind if what is None else [Kind(what)]:
         print(f"{each.value}:")
         for line in lines(each):
             print(f"  {line}")
