@@ -40,7 +40,9 @@ def command(
     from hybridreg.learned.training.loop import CHECKPOINT
     from hybridreg.learned.training.stop_flag import StopFlag
     from hybridreg.learned.training.training_run import RunOptions, train
+    from hybridreg.runtime.heap import keep_freed_memory
 
+    keep_freed_memory()
     wanted = recipe_file.read(recipe)
     if data:
         wanted = data_choice.with_data(wanted, data)
