@@ -47,7 +47,10 @@ def build(changes: Mapping[str, Any]) -> Pipeline:
     else:
         name = changes.get("preset", presets.DEFAULT)
         start, what = Pipeline(**presets.load(name)), f"preset {name!r}"
-    built = apply(start, {key: value for key, value in changes.items() if key not in ("preset", "pipeline")})
+    changed = {key: value for key, value in changes.items() if key not in ("preset", "pipeline")}
+    if set(changed) & set(SLOTS):
+        what = "this pipeline"
+    built = apply(start, changed)
     # Now, not before: the weights may be what was changed.
     shipped_weights.require({slot: getattr(built, slot) for slot in SLOTS}, what)
     return built

@@ -129,3 +129,10 @@ def test_half_a_folder_is_no_weights(package: Path) -> None:
     (package / "cross3dreg-small" / "config.json").write_text("{}")
     assert shipped_weights.names() == []
     assert shipped_weights.find("cross3dreg-small") is None
+
+
+def test_a_folder_that_is_not_there_is_told_as_such() -> None:
+    with pytest.raises(
+        FileNotFoundError, match=r"^this pipeline needs the weights 'runs/x/last', a folder that is not there"
+    ):
+        changes.build({"match": {"stage": "vgam", "weights": "runs/x/last"}, "estimate": "svd"})

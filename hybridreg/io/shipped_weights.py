@@ -75,9 +75,12 @@ def require(slots: Mapping[str, Any], what: str) -> None:
     }
     if missing:
         options = " ".join(f"--set {slot}.weights=FOLDER" for slot in missing)
+        name = next(iter(missing.values()))
+        where = "a folder that is not there"
+        if len(Path(name).parts) == 1:
+            where = f"which do not come with this version (shipped: {', '.join(names()) or 'none'})"
         raise MissingWeights(
-            f"{what} needs the weights {next(iter(missing.values()))!r}, which do not come with this version "
-            f"(shipped: {', '.join(names()) or 'none'}); train some with `hybridreg train` and name their folder: "
+            f"{what} needs the weights {name!r}, {where}; train some with `hybridreg train` and name their folder: "
             f"{options}"
         )
 
