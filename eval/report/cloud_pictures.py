@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybridreg.geometry import se3
+from hybridreg.geometry.extent import sample
 from hybridreg.io import atomic_path
 
 if TYPE_CHECKING:
@@ -90,4 +91,4 @@ def draw_clouds(axes: Any, source: Array, target: Array, window: tuple[Array, Ar
 
 def thin(points: Array) -> Array:
     """The points (N, 3), or a subset where a picture cannot show more."""
-    return points[:: max(1, len(points) // _DRAWN)]
+    return sample(points, _DRAWN)

@@ -14,6 +14,7 @@ from hybridreg.evidence import agreement, views
 from hybridreg.evidence.surface_distance import Surfaces
 from hybridreg.frames import lower_pose
 from hybridreg.geometry import se3
+from hybridreg.geometry.extent import sample
 from hybridreg.pair import Pair
 from hybridreg.prior.placing import sized
 from hybridreg.resolution import Tolerance
@@ -63,7 +64,7 @@ def of(pair: Pair, result: RegistrationResult) -> LaidOut:
     T = lower_pose(result.transformation, pair)
     both = views.of(VoxelGrid()(pair))
     seen = agreement.compare(both, T)
-    moving = thinned(pair.source.points, DRAWN)
+    moving = sample(pair.source.points, DRAWN)
     source = se3.apply(T, moving)
     # Sampled points of the target that the source's sensor saw through are drawn where they are.
     through = both.target.points[both.target.asked][seen.target.free]
@@ -71,7 +72,7 @@ def of(pair: Pair, result: RegistrationResult) -> LaidOut:
     return LaidOut(
         source=source,
         before=moving,
-        target=thinned(pair.target.points, DRAWN),
+        target=sample(pair.target.points, DRAWN),
         residual=residuals(source, both.fine.target),
         violations=np.vstack([seen.source.moved[seen.source.free], through]),
         looked=int(seen.source.looked.sum() + seen.target.looked.sum()),
@@ -96,8 +97,3 @@ def residuals(points: Array, surfaces: Surfaces) -> Array:
     off = points[found] - surfaces.points[row[found]]
     result[found] = np.abs(np.einsum("ni,ni->n", off, surfaces.facing(row[found])))
     return result
-
-
-def thinned(points: Array, n: int) -> Array:
-    """At most `n` of the points (N, 3), evenly along the file."""
-    return points[np.unique(np.linspace(0, len(points) - 1, min(n, len(points))).astype(np.int64))]

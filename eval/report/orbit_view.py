@@ -16,10 +16,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybridreg.eval.report import laid_out, page
-from hybridreg.eval.report.laid_out import residuals, thinned
+from hybridreg.eval.report.laid_out import residuals
 from hybridreg.evidence.surface_distance import FineSurfaces
 from hybridreg.frames import lower_pose
 from hybridreg.geometry import se3
+from hybridreg.geometry.extent import sample
 from hybridreg.pair import Pair
 from hybridreg.resolution import tolerance
 
@@ -106,7 +107,7 @@ def pair_page(pair: Pair, T: Array, title: str, drawn: int) -> str:
     T : (4, 4), source to target, in the user's coordinates
     drawn : points of each cloud, at most
     """
-    source, target = (thinned(cloud.points, drawn) for cloud in (pair.source, pair.target))
+    source, target = (sample(cloud.points, drawn) for cloud in (pair.source, pair.target))
     lowered = lower_pose(T, pair)
     moved = se3.apply(lowered, source)
     most = laid_out.reddest(tolerance(pair.source, pair.target))

@@ -62,7 +62,9 @@ def write(
     folder = Path(out)
     folder.mkdir(parents=True, exist_ok=True)
     result.save(folder / "T_target_source.txt")
-    write_json(folder / "result.json", {**result.to_dict(), **({"origin": origin._asdict()} if origin else {})})
+    write_json(
+        folder / "result.json", {**result.to_dict(), **({"origin": origin._asdict()} if origin else {})}
+    )
     moving = sized(pair.source, result.scale)
     T = lower_pose(result.transformation, pair.replaced(source=moving))
     drawn = {

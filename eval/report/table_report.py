@@ -13,7 +13,6 @@ import numpy as np
 from hybridreg.data.dataset import ids_of
 from hybridreg.eval.report import formats, line_styles, orbit_view, page, plotly_figures
 from hybridreg.eval.report.curve_panels import by_estimator
-from hybridreg.eval.report.laid_out import thinned
 from hybridreg.eval.report.line_styles import styles
 from hybridreg.eval.report.table_columns import Cells, number
 from hybridreg.eval.run.attempt import one_line
@@ -24,6 +23,7 @@ from hybridreg.eval.score.scoring import identity
 from hybridreg.eval.scored_table import IDENTITY, Entry, Table
 from hybridreg.frames import lower_pose
 from hybridreg.geometry import se3
+from hybridreg.geometry.extent import sample
 from hybridreg.io import write_text
 from hybridreg.pair import LabelledPair, Pair
 from hybridreg.runtime import optional_packages
@@ -181,7 +181,7 @@ def _layers(pair: Pair, row: Row) -> list[orbit_view.Layer]:
     # Without a pose as it came, in the small coordinates that both clouds are drawn in.
     found = np.eye(4) if row.T is None else lower_pose(np.array(row.T), pair)
     truth = lower_pose(np.array(row.T_true), pair)
-    source, target = (thinned(cloud.points, _DRAWN) for cloud in (pair.source, pair.target))
+    source, target = (sample(cloud.points, _DRAWN) for cloud in (pair.source, pair.target))
     layer = orbit_view.Layer
     return [
         layer("target", target, "#8f99a8"),

@@ -22,6 +22,16 @@ def bounds(points: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any]]:
     return np.array([column.min() for column in columns]), np.array([column.max() for column in columns])
 
 
+def sample(points: Array, n: int) -> Array:
+    """At most `n` of the points (N, 3), drawn at random, always the same ones, in their order.
+
+    Every k-th point would be a single ring of a cloud whose rings take turns in the file.
+    """
+    if len(points) <= n:
+        return points
+    return points[np.sort(np.random.default_rng(0).choice(len(points), n, replace=False))]
+
+
 def some(points: Array) -> Array:
     """The points (N, 3) themselves, or a million drawn at random where there are more, always the same."""
     if len(points) <= _ENOUGH:

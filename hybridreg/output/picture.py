@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybridreg.geometry import se3
+from hybridreg.geometry.extent import sample
 from hybridreg.geometry.fitness import Overlay
 from hybridreg.runtime.optional_packages import load
 
@@ -30,7 +31,7 @@ def figure(overlay: Overlay) -> Any:
         Without plotly.
     """
     graph = load("plotly.graph_objects", "result.plot()")
-    source, target = _thin(overlay.source), _thin(overlay.target)
+    source, target = sample(overlay.source, _SHOWN), sample(overlay.target, _SHOWN)
     clouds = {
         "target": target,
         "source, aligned": se3.apply(overlay.T_target_source, source),
@@ -48,7 +49,3 @@ def figure(overlay: Overlay) -> Any:
         )  # fmt: skip
     shown.update_layout(scene={"aspectmode": "data"}, margin={"l": 0, "r": 0, "t": 0, "b": 0})
     return shown
-
-
-def _thin(points: Array) -> Array:
-    return points[:: max(1, len(points) // _SHOWN)]

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 import hybridreg as hr
-from hybridreg.geometry.extent import bounds, radii, share_within
+from hybridreg.geometry.extent import bounds, radii, sample, share_within
 
 
 @pytest.mark.parametrize("order", ["C", "F"])
@@ -23,3 +23,16 @@ def test_a_cloud_that_lies_column_by_column_has_a_reach() -> None:
     points = np.random.default_rng(0).normal(size=(500, 3))
     across, along = (hr.PointCloud.of(np.array(points, order=order)) for order in ("F", "C"))  # type: ignore[call-overload]
     assert np.array_equal(across.radii, along.radii)
+
+
+def test_a_sample_is_of_every_ring_and_always_the_same() -> None:
+    rings, columns = 64, 2048  # an organised cloud, ring by ring within each column
+    points = np.column_stack(
+        [np.tile(np.arange(rings), columns), np.arange(rings * columns), np.zeros(rings * columns)]
+    )
+    drawn = sample(points, 4_000)
+    assert len(drawn) == 4_000
+    assert len(np.unique(drawn[:, 0])) == rings
+    assert np.all(np.diff(drawn[:, 1]) > 0)
+    assert np.array_equal(drawn, sample(points, 4_000))
+    assert np.array_equal(sample(points[:10], 4_000), points[:10])

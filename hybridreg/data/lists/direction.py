@@ -14,6 +14,7 @@ from scipy.spatial import cKDTree
 
 from hybridreg.frames import lower_pose
 from hybridreg.geometry import se3
+from hybridreg.geometry.extent import sample
 from hybridreg.geometry.fitness import measure
 from hybridreg.pair import LabelledPair
 
@@ -95,8 +96,8 @@ def overlap(labelled: LabelledPair, radius: float, *, inverted: bool = False) ->
     """Share of the source's points that the pose, or its inverse, brings within `radius` of the target."""
     pair, T = labelled.pair, labelled.T_target_source
     pose = lower_pose(se3.inverse(T) if inverted else T, pair)
-    tree = cKDTree(_thinned(pair.target.points, _TARGET))
-    return measure(_thinned(pair.source.points, _SOURCE), tree, pose, radius).fitness
+    tree = cKDTree(sample(pair.target.points, _TARGET))
+    return measure(sample(pair.source.points, _SOURCE), tree, pose, radius).fitness
 
 
 def measured(pairs: Readable, n: int = PAIRS) -> Direction:
@@ -150,7 +151,3 @@ def check(pairs: Readable, name: str, cure: str, *, n: int = PAIRS, clearly: boo
 def spread(length: int, n: int) -> list[int]:
     """Up to `n` rows of `length`, evenly spread."""
     return [int(row) for row in np.unique(np.linspace(0, length - 1, min(n, length)).round())]
-
-
-def _thinned(points: Array, most: int) -> Array:
-    return points[:: max(1, len(points) // most)]
