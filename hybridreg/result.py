@@ -140,15 +140,18 @@ class RegistrationResult:
         return of_information(self.information)
 
     def apply(self, points: Any) -> Array:
-        """Points of the source (N, 3), or any cloud that `PointCloud.of` takes, in the target's coordinates: (N, 3)."""
-        cloud = points if isinstance(points, np.ndarray) else PointCloud.of(points, name="points")
-        if isinstance(cloud, PointCloud):
-            rows = cloud.points + cloud.offset
+        """Points of the source (N, 3), or any cloud that `PointCloud.of` takes, in the target's coordinates: (N, 3).
+
+        Of arrays every row stays, whether finite or not; (3, N) is taken for channels first, as everywhere.
+        """
+        from hybridreg.io.arrays import array_points
+
+        if isinstance(points, (np.ndarray, list, tuple)):
+            rows = array_points(np.asarray(points), "points")
         else:
-            rows = np.asarray(cloud, dtype=np.float64)
-            if rows.ndim != 2 or rows.shape[1] < 3:
-                raise ValueError(f"points: expected an array of shape (N, 3), got {rows.shape}")
-        return se3.apply(self.transformation, rows[:, :3] * self.scale)
+            cloud = PointCloud.of(points, name="points")
+            rows = cloud.points + cloud.offset
+        return se3.apply(self.transformation, rows * self.scale)
 
     def format(self, form: str) -> str:
         """The pose as "matrix", "quaternion", "ros-tf", "urdf", "cloudcompare", "kitti" or "tum"; see

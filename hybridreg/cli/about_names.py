@@ -49,9 +49,12 @@ def _fields(slot: str, name: str, stage: type[Any]) -> str:
 
 
 def _line(field: dataclasses.Field[Any]) -> str:
-    if field.default is dataclasses.MISSING and field.default_factory is dataclasses.MISSING:
+    if field.default is not dataclasses.MISSING:
+        value = field.default
+    elif field.default_factory is not dataclasses.MISSING:
+        value = field.default_factory()
+    else:
         return f"{field.name} = ...  # needed"
-    value = field.default_factory() if field.default is dataclasses.MISSING else field.default  # type: ignore[misc]
     if value is None:  # TOML has no such value
         return f"# {field.name} is not set"
     if isinstance(value, (bool, int, float, str)) or (isinstance(value, tuple) and "{" not in repr(value)):

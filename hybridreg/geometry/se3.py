@@ -103,6 +103,16 @@ def random_rotation(rng: np.random.Generator) -> Array:
     )
 
 
+# What to do with the numbers of a pose in another shape.
+_CURES = {
+    (3, 4): "; append the row [0, 0, 0, 1]",
+    (12,): "; if they are rows of R and t in turn: numpy.vstack([T.reshape(3, 4), [0, 0, 0, 1]])",
+    (16,): "; if they are row after row: T.reshape(4, 4)",
+    (3, 3): "; a rotation alone goes into the upper left of numpy.eye(4)",
+    (7,): "; a quaternion and a translation: scipy.spatial.transform.Rotation.from_quat(xyzw).as_matrix()",
+}
+
+
 def check(T: Any, name: str = "T", tolerance: float = 1e-4) -> Array:
     """Return T as (4, 4) float64 if it is a rigid motion.
 
@@ -116,7 +126,7 @@ def check(T: Any, name: str = "T", tolerance: float = 1e-4) -> Array:
     except (TypeError, ValueError, OverflowError) as error:
         raise ValueError(f"{name}: expected numbers of shape (4, 4) ({error})") from error
     if matrix.shape != (4, 4):
-        raise ValueError(f"{name}: expected shape (4, 4), got {matrix.shape}")
+        raise ValueError(f"{name}: expected shape (4, 4), got {matrix.shape}{_CURES.get(matrix.shape, '')}")
     if not np.isfinite(matrix).all():
         raise ValueError(f"{name}: the matrix is not finite")
     if not np.allclose(matrix[3], [0, 0, 0, 1], atol=1e-9):

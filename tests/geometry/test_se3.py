@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: MIT
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -99,3 +101,18 @@ def test_a_turn_about_a_place_leaves_it_but_for_the_shift(numbers: list[float]) 
     T = se3.about(centre, se3.rotation_about(vector), shift)
     assert np.allclose(se3.apply(T, centre[None])[0], centre + shift, atol=1e-12)
     assert np.array_equal(T[:3, :3], se3.rotation_about(vector))
+
+
+@pytest.mark.parametrize(
+    ("shape", "cure"),
+    [
+        ((3, 4), "append the row"),
+        ((16,), "reshape(4, 4)"),
+        ((12,), "reshape(3, 4)"),
+        ((7,), "from_quat"),
+        ((3, 3), "eye(4)"),
+    ],
+)
+def test_a_pose_in_another_shape_is_told_how_to_become_a_matrix(shape: tuple[int, ...], cure: str) -> None:
+    with pytest.raises(ValueError, match=f"init: expected shape .*{re.escape(cure)}"):
+        se3.check(np.zeros(shape), "init")
