@@ -38,11 +38,12 @@ class Encoding:
 
 
 class Known(NamedTuple):
-    """Results that are invariant to yaw and shifts: output of the backbone, and evidence for the overlap."""
+    """Results that are invariant to yaw and shifts: output of the backbone, evidence for the overlap, and patches."""
 
     coarse: Tensor  # (n, C), both clouds
     fine: Tensor  # (N, d)
     evidence: tuple[Tensor, Tensor] | None = None
+    patches: tuple[Patches, Patches] | None = None  # of target and source
 
 
 @dataclass(frozen=True, kw_only=True)

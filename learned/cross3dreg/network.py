@@ -34,7 +34,7 @@ from hybridreg.learned.matching.sinkhorn import OptimalTransport
 from hybridreg.learned.matching.superpoint_matching import SuperpointMatches, match_superpoints
 from hybridreg.learned.memory_estimate import forward_bytes
 from hybridreg.learned.pretrained import Pretrained
-from hybridreg.learned.pyramid.patches import build_patches
+from hybridreg.learned.pyramid.patches import Patches, build_patches
 from hybridreg.learned.pyramid.point_pyramid import Pyramid
 from hybridreg.learned.weights import load_official_tensors
 
@@ -104,11 +104,11 @@ class RegistrationNetwork(Pretrained):
         """Run the encoders and group fine points into patches; ``known`` skips the backbone where its output for this
         batch is known."""
         pyramid = batch.pyramid
-        coarse, fine, evidence = known or Known(*self.backbone(batch.features, pyramid))
+        coarse, fine, evidence, patches = known or Known(*self.backbone(batch.features, pyramid))
         nodes = coarse.split(list(pyramid.lengths[-1]))
         points = fine.split(list(pyramid.lengths[self.config.backbone.fine_stage - 1]))
-        target = self._cloud(pyramid, 0, nodes[0], points[0])
-        source = self._cloud(pyramid, 1, nodes[1], points[1])
+        target = self._cloud(pyramid, 0, nodes[0], points[0], patches and patches[0])
+        source = self._cloud(pyramid, 1, nodes[1], points[1], patches and patches[1])
         if evidence is None and self.omp is not None and self.omp.config.evidence:
             evidence = self._evidence(target, source)
         image = None if self.image_encoder is None else self.image_encoder(batch.image)
@@ -123,7 +123,12 @@ class RegistrationNetwork(Pretrained):
         )
 
     def _cloud(
-        self, pyramid: Pyramid, cloud: int, node_features: Tensor, point_features: Tensor
+        self,
+        pyramid: Pyramid,
+        cloud: int,
+        node_features: Tensor,
+        point_features: Tensor,
+        patches: Patches | None,
     ) -> CloudEncoding:
         nodes = pyramid.clouds(pyramid.stages - 1)[cloud]
         points = pyramid.clouds(self.config.backbone.fine_stage - 1)[cloud]
@@ -132,7 +137,7 @@ class RegistrationNetwork(Pretrained):
             node_features=node_features,
             points=points,
             point_features=point_features,
-            patches=build_patches(points, nodes, self.config.matching.patch_points),
+            patches=patches or build_patches(points, nodes, self.config.matching.patch_points),
         )
 
     def predict_overlap(self, encoding: Encoding) -> OverlapLogits | None:

@@ -16,6 +16,7 @@ from hybridreg.learned.cross3dreg.batch import make_batch
 from hybridreg.learned.cross3dreg.network import Known, RegistrationNetwork
 from hybridreg.learned.cross3dreg.sizes import named_config
 from hybridreg.learned.cross3dreg.superpoint_evidence import SIZE, superpoint_evidence
+from hybridreg.learned.training.data.frozen import FrozenFeatures
 
 TEMPERATURE = 0.1
 
@@ -79,3 +80,16 @@ def test_a_mask_predictor_uses_it_and_known_evidence_is_taken() -> None:
         changed = network.predict_overlap(network.encode(batch, known._replace(evidence=other)))
     assert torch.equal(logits.target, again.target)
     assert not torch.allclose(logits.target, changed.target)
+
+
+def test_patches_that_are_known_are_taken_as_they_are() -> None:
+    network = RegistrationNetwork(named_config("nano", omp=False, vgam=False)).eval()
+    points = street(0)
+    batch = make_batch(points, moved(points, yaw(30.0)), network.config)
+    kept = FrozenFeatures(network, active=True)
+    with torch.no_grad():
+        plain = network.encode(batch)
+        again = network.encode(batch, kept.of(0, batch))
+    for one, other in ((plain.target, again.target), (plain.source, again.source)):
+        for name in ("owner", "index", "mask"):
+            assert torch.equal(getattr(one.patches, name), getattr(other.patches, name)), name
