@@ -123,20 +123,15 @@ class RegistrationNetwork(Pretrained):
         )
 
     def _cloud(
-        self,
-        pyramid: Pyramid,
-        cloud: int,
-        node_features: Tensor,
-        point_features: Tensor,
-        patches: Patches | None,
+        self, pyramid: Pyramid, cloud: int, coarse: Tensor, fine: Tensor, patches: Patches | None
     ) -> CloudEncoding:
         nodes = pyramid.clouds(pyramid.stages - 1)[cloud]
         points = pyramid.clouds(self.config.backbone.fine_stage - 1)[cloud]
         return CloudEncoding(
             nodes=nodes,
-            node_features=node_features,
+            node_features=coarse,
             points=points,
-            point_features=point_features,
+            point_features=fine,
             patches=patches or build_patches(points, nodes, self.config.matching.patch_points),
         )
 
