@@ -5,7 +5,7 @@ code.
     python -m benchmarks.time_map --data ../shared/data/real
 
 A second thread looks every few milliseconds which function of this library is at work, calls into other libraries
-counted with it. Shares are of the wall time of all rounds together; one thread of torch and of the search.
+counted with it. Shares are of the wall time of all rounds together.
 """
 
 from __future__ import annotations

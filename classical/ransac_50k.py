@@ -18,7 +18,6 @@ from hybridreg.scene import Scene
 from hybridreg.stage import Stage
 
 Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
 
 # Samples fitted together: the fastest of 500, 5,000 and 50,000.
 _BATCH = 5_000
@@ -61,8 +60,7 @@ class Ransac50k(Stage):
             return Pose.unknown(len(matches))
         with single():
             consensus = Consensus(source, target, np.ones(len(source)), self.max_distance)
-            poses, counts = self._likeliest(consensus, rng)
-            supports = [consensus.support(T) for T in poses[counts >= counts.max(initial=0) - _ROUNDING]]
+            supports = [consensus.support(T) for T in self._likeliest(consensus, rng)]
         # Open3D's order: more inliers, and among as many the smaller error; of equals the first.
         best = max(supports, key=lambda one: (one.n_inliers, one.score), default=None)
         if best is None or best.n_inliers < 3:
@@ -72,8 +70,8 @@ class Ransac50k(Stage):
         )
         return Pose(best.T, inliers=inliers)
 
-    def _likeliest(self, consensus: Consensus, rng: np.random.Generator) -> tuple[Array, Indices]:
-        """Poses of samples, and how many matches agree with each: those that could still be the best."""
+    def _likeliest(self, consensus: Consensus, rng: np.random.Generator) -> Array:
+        """Poses of samples (B, 4, 4): those that may be the best."""
         poses, counts = np.empty((0, 4, 4)), np.empty(0, dtype=np.int64)
         for start in range(0, self.iterations, _BATCH):
             rows = rng.integers(0, len(consensus), (min(_BATCH, self.iterations - start), _SIZE))
@@ -83,4 +81,4 @@ class Ransac50k(Stage):
             counts = np.concatenate([counts, consensus.counts(new)])
             hopeful = counts >= counts.max(initial=0) - _ROUNDING
             poses, counts = poses[hopeful], counts[hopeful]
-        return poses, counts
+        return poses

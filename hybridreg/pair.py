@@ -132,9 +132,9 @@ def _image(image: Any) -> Any:
     from hybridreg.io import as_image, check_image
 
     if not isinstance(image, (str, os.PathLike)):
-        if not hasattr(image, "__array__") and not isinstance(image, (list, tuple)):
-            raise ValueError(f"image: is a {type(image).__name__}, no array and no path; {_ELSEWHERE}")
         shape = np.shape(image)
+        if not shape:
+            raise ValueError(f"image: is a {type(image).__name__}, no array and no path; {_ELSEWHERE}")
         if len(shape) == 2 and 0 < min(shape) < _FEWEST_PIXELS:
             size = " x ".join(map(str, shape))
             raise ValueError(f"image: an array of {size} is no camera image; {_ELSEWHERE}")

@@ -47,3 +47,12 @@ def test_a_pipeline_is_no_presets_name() -> None:
 def test_pictures_stay_pictures(shape: tuple[int, ...]) -> None:
     pair = hr.Pair.of(CLOUD, CLOUD, np.zeros(shape, np.uint8))
     assert np.shape(pair.image) == (*shape[:2], 3)
+
+
+def test_a_picture_of_another_library_stays_one() -> None:
+    class Picture:  # as Pillow's: nothing but numpy's protocol
+        def __init__(self) -> None:
+            self._pixels = np.full((72, 128, 3), 7, np.uint8)
+            self.__array_interface__ = self._pixels.__array_interface__
+
+    assert np.all(np.asarray(hr.Pair.of(CLOUD, CLOUD, Picture()).image) == 7)

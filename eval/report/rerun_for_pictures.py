@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from hybridreg.config.plain_values import value_of
 from hybridreg.data.dataset import ids_of
 from hybridreg.eval.report import stage_pictures
-from hybridreg.eval.run.controls import Control
+from hybridreg.eval.run.controls import Control, after
 from hybridreg.eval.run.truth import mask_threshold
 from hybridreg.eval.score.protocols import Protocol
 from hybridreg.eval.scored_table import Entry, Table
@@ -88,8 +88,9 @@ class Rerun(NamedTuple):
 
 def rerun(method: str, control: Control, pairs: Sequence[LabelledPair], index: int, seed: int) -> Rerun:
     """Run a method on a pair once more."""
-    pipeline, pair = control.told(pairs, index)
-    truth = lower_pose(pairs[index].T_target_source, pair)
+    labelled = pairs[index]
+    pipeline, pair = control.told(labelled, after(pairs, index))
+    truth = lower_pose(labelled.T_target_source, pair)
     return Rerun(method, pair.id, pipeline.trace(pair, seed=seed), truth, mask_threshold(pipeline.match))
 
 

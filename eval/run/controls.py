@@ -8,7 +8,7 @@ for this one pair. The stage that uses the true pose is not registered, so no pi
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -53,17 +53,24 @@ class Control:
         """The pipeline's tables, and what the control does to it."""
         return {**self.pipeline.to_spec(), "control": {"oracle": self.oracle, "image": self.image}}
 
-    def told(self, pairs: Sequence[LabelledPair], index: int) -> tuple[Pipeline, Pair]:
-        """The pipeline for one of the pairs, and the pair as the pipeline may see it."""
-        labelled = pairs[index]
+    def told(
+        self, labelled: LabelledPair, other: Callable[[], LabelledPair] | None = None
+    ) -> tuple[Pipeline, Pair]:
+        """The pipeline for this pair, and the pair as the pipeline may see it; `other` reads the next pair."""
         pipeline, pair = self.pipeline, labelled.pair
         if self.oracle:
             pipeline = pipeline.swap(overlap=TrueOverlap(T=lower_pose(labelled.T_target_source, pair)))
         if self.image == "other":
-            pair = dataclasses.replace(pair, image=pairs[(index + 1) % len(pairs)].pair.image)
+            assert other is not None, "a control by another pair's image needs that pair"
+            pair = dataclasses.replace(pair, image=other().pair.image)
         elif not self.image:
             pair = dataclasses.replace(pair, image=None)
         return pipeline, pair
+
+
+def after(pairs: Sequence[LabelledPair], index: int) -> Callable[[], LabelledPair]:
+    """Reads the pair after this one, and after the last the first."""
+    return lambda: pairs[(index + 1) % len(pairs)]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -14,7 +14,7 @@ from hybridreg.data import content
 from hybridreg.data.dataset import fingerprint_of, ids_of, looks_of, vouch
 from hybridreg.eval.run import truth
 from hybridreg.eval.run.attempt import Method, attempt, one_line
-from hybridreg.eval.run.controls import Control
+from hybridreg.eval.run.controls import Control, after
 from hybridreg.eval.run.header import fingerprint_under
 from hybridreg.eval.run.row import Row
 from hybridreg.eval.run.store import Appender
@@ -140,7 +140,9 @@ def predict_pair(
         except Exception as error:
             return Row(index=index, id=name, error=one_line(error))
         try:
-            told, pair = method.told(pairs, index) if isinstance(method, Control) else (method, labelled.pair)
+            told, pair = method, labelled.pair
+            if isinstance(method, Control):
+                told, pair = method.told(labelled, after(pairs, index))
         except Exception as error:  # the other pair's image may be what cannot be read
             return Row(index=index, id=name, error=one_line(error))
         tried = attempt(told, pair, seed)

@@ -14,7 +14,7 @@ import hybridreg as hr
 from hybridreg import testing
 from hybridreg.eval import table_file, table_run
 from hybridreg.eval.report import formats
-from hybridreg.eval.run.controls import MARK, Control, TrueOverlap
+from hybridreg.eval.run.controls import MARK, Control, TrueOverlap, after
 from hybridreg.eval.run.prediction import predict
 from hybridreg.geometry import se3
 from hybridreg.matches import Correspondences, Overlap
@@ -48,7 +48,7 @@ PIPE = hr.Pipeline(voxel=0.5, match=Watching(), estimate="identity", refine="non
 
 def test_the_oracle_mask_is_the_overlap_under_the_truth() -> None:
     labelled = Yards().load(0)
-    pipeline, pair = Control(pipeline=PIPE, oracle=True).told([labelled], 0)
+    pipeline, pair = Control(pipeline=PIPE, oracle=True).told(labelled)
     scene = pipeline.downsample(pair)
     found = pipeline.overlap(scene)
     moved = se3.apply(labelled.T_target_source, scene.source.points)
@@ -82,7 +82,8 @@ def test_another_pairs_image_is_the_next_ones() -> None:
                                   T_target_source=np.eye(4)) for k in (10, 20))  # fmt: skip
     control = Control(pipeline=PIPE, image="other")
     for index, shown in ((0, second), (1, first)):
-        _, pair = control.told([first, second], index)
+        both = [first, second]
+        _, pair = control.told(both[index], after(both, index))
         assert np.array_equal(pair.image, shown.pair.image)
         assert np.array_equal(pair.source.points, [first, second][index].pair.source.points)
     assert control.to_spec()["control"]["image"] == "other"
@@ -95,7 +96,7 @@ def test_an_image_is_the_pairs_or_none_or_anothers(image: object) -> None:
 
 
 def test_the_truth_cannot_be_named_in_a_pipeline_file(tmp_path: Path) -> None:
-    told, _ = Control(pipeline=hr.Pipeline(**STILL), oracle=True).told(Yards(), 0)
+    told, _ = Control(pipeline=hr.Pipeline(**STILL), oracle=True).told(Yards().load(0))
     assert isinstance(told.overlap, TrueOverlap)
     with pytest.raises(ValueError, match="not registered"):
         told.save(tmp_path / "p.toml")

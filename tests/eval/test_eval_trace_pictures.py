@@ -31,7 +31,7 @@ def traced() -> tuple[Trace, np.ndarray]:
     pair, T = testing.sample_pair(n_points=900)
     labelled = LabelledPair(pair=pair, T_target_source=T)
     pipeline = hr.Pipeline(voxel=0.5, match="none", estimate="identity", refine="none")
-    told, _ = Control(pipeline=pipeline, oracle=True).told([labelled], 0)
+    told, _ = Control(pipeline=pipeline, oracle=True).told(labelled)
     trace = told.trace(pair)
     source = trace.scene.source.points[::10]
     return replace(trace, matches=Correspondences.of(source, se3.apply(T, source))), T
