@@ -140,9 +140,11 @@ def predict_pair(
         except Exception as error:
             return Row(index=index, id=name, error=one_line(error))
         try:
-            told, pair = method, labelled.pair
-            if isinstance(method, Control):
-                told, pair = method.told(labelled, after(pairs, index))
+            told, pair = (
+                method.told(labelled, after(pairs, index))
+                if isinstance(method, Control)
+                else (method, labelled.pair)
+            )
         except Exception as error:  # the other pair's image may be what cannot be read
             return Row(index=index, id=name, error=one_line(error))
         tried = attempt(told, pair, seed)
