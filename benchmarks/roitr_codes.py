@@ -98,7 +98,7 @@ def report(config: RoitrConfig, points: int, repeats: int) -> None:
 def main() -> None:
     """Read the arguments and print the report."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--size", default="3dmatch")
+    parser.add_argument("--size", default="roitr-3dmatch")
     parser.add_argument("--points", type=int, default=6000, help="of each cloud")
     parser.add_argument("--threads", type=int, default=1)
     parser.add_argument("--repeats", type=int, default=9)

@@ -97,7 +97,7 @@ class FcgfNetwork(Pretrained):
             down = pyramid.map(config.tr_kernel, level, level + 1)
             features = self.decoder[level](features, down, self._same(pyramid, level))
             features = torch.cat([features, skips[level]], 1)
-        features = self.final(self.mix(features, None).relu(), _map(pyramid, config.final_kernel, 0, 0))
+        features = self.final(self.mix(features, None).relu_(), _map(pyramid, config.final_kernel, 0, 0))
         features = features[pyramid.inverse]
         if not config.normalize:
             return features
@@ -188,9 +188,9 @@ class _Block(nn.Module):
         self.norm2 = _norm(width, config)
 
     def forward(self, features: Tensor, same: KernelMap | None) -> Tensor:
-        out = self.norm1(self.conv1(features, same)).relu()
-        out = self.norm2(self.conv2(out, same)) + features
-        return out.relu()
+        # In place: a voxel's row is not read again.
+        out = self.norm1(self.conv1(features, same)).relu_()
+        return self.norm2(self.conv2(out, same)).add_(features).relu_()
 
 
 def _norm(width: int, config: FcgfConfig) -> nn.BatchNorm1d:

@@ -8,6 +8,10 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
+# Up to so many cells for each voxel its row is looked up in a table of all cells, one kilobyte a voxel; the keys of
+# emptier grids are searched.
+_CELLS_PER_VOXEL = 256
+
 
 @dataclass(frozen=True)
 class VoxelKeys:
@@ -38,3 +42,23 @@ class VoxelKeys:
     def step(self, dy: Tensor, dz: Tensor) -> Tensor:
         """By how much a key grows along y and z."""
         return (dz * self.extent[2] + dy) * self.extent[1]
+
+    def rows_of_runs(self, keys: Tensor, first: Tensor, length: int) -> Tensor:
+        """(R, length, M) int32: the rows of ``keys`` (N,), sorted and distinct, that hold each run of successive keys.
+
+        ``first`` (R, M) are the keys that the runs begin with; N stands where there is no such key.
+        """
+        cells = int(self.extent.prod())
+        if cells <= _CELLS_PER_VOXEL * len(keys):
+            table = keys.new_full((cells,), len(keys), dtype=torch.int32)
+            table[keys] = torch.arange(len(keys), dtype=torch.int32, device=keys.device)
+            wanted = first[:, None] + torch.arange(length, device=keys.device)[:, None]
+            return table.index_select(0, wanted.flatten()).view(wanted.shape)
+        # One search finds the first of a run, the others follow it.
+        rows, found = torch.searchsorted(keys, first.contiguous(), out_int32=True), []
+        after = torch.cat([keys, keys.new_full((1,), 2**62)])
+        for step in range(length):
+            hit = after[rows] == first + step
+            found.append(rows.where(hit, len(keys)))
+            rows = rows + hit
+        return torch.stack(found, 1)

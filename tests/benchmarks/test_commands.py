@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import importlib
 import re
 import subprocess
 import sys
@@ -48,3 +49,16 @@ def test_a_checkout_alone_is_enough() -> None:
     )
     assert done.returncode == 0, done.stderr
     assert "--workers" in done.stdout
+
+
+SIZED = {
+    script.stem: found[1]
+    for script in SCRIPTS
+    if (found := re.search(r'"--size", default="([^"]+)"', script.read_text(encoding="utf-8")))
+}
+
+
+@pytest.mark.parametrize(("script", "size"), SIZED.items())
+def test_the_size_that_a_script_takes_by_default_is_known(script: str, size: str) -> None:
+    importlib.import_module(f"benchmarks.{script}").named_config(size)
+    assert len(SIZED) >= 3

@@ -8,7 +8,7 @@ import pytest
 import torch
 from torch.nn import functional as F
 
-from hybridreg.learned.layers import sparse_conv
+from hybridreg.learned.layers import sparse_conv, voxel_keys
 from hybridreg.learned.layers.kernel_maps import kernel_map, kernel_offsets
 from hybridreg.learned.layers.sparse_conv import SparseConv, convolve
 from hybridreg.learned.layers.voxels import VoxelPyramid, quantise
@@ -147,14 +147,24 @@ def test_voxels_that_cannot_be_numbered_are_refused() -> None:
         VoxelPyramid(far, (1, 2))
 
 
-@pytest.mark.parametrize("size", [3, 5])
+@pytest.mark.parametrize("size", [2, 3, 5])
 @pytest.mark.parametrize("stride", [1, 2])
-def test_half_a_search_and_a_wider_kernels_map_give_the_whole_map(size: int, stride: int) -> None:
-    drawn = torch.randint(0, 12, (900, 4), generator=torch.Generator().manual_seed(size)) * torch.tensor(
-        [1, *[stride] * 3]
-    )
-    coords = torch.unique(drawn % torch.tensor([2, 99, 99, 99]), dim=0)
-    levels = VoxelPyramid(coords, (1,)).levels[0]
-    whole = kernel_map(levels, levels.clone(), size, stride)  # two tensors: nothing is mirrored
-    assert torch.equal(kernel_map(levels, levels, size, stride).table, whole.table)
-    assert torch.equal(kernel_map(levels, levels, size + 2, stride).narrower(size).table, whole.table)
+def test_neighbours_are_the_same_from_a_table_and_from_a_search(
+    size: int, stride: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    levels = pyramid(strides=(1, stride)).levels[-1]
+    looked_up = kernel_map(levels, levels, size, stride).table
+    if size > 2:
+        assert torch.equal(kernel_map(levels, levels, size + 2, stride).narrower(size).table, looked_up)
+    monkeypatch.setattr(voxel_keys, "_CELLS_PER_VOXEL", 0)
+    searched = kernel_map(levels, levels, size, stride).table
+    assert torch.equal(searched, looked_up)
+    assert 0 < int((searched == len(levels)).sum()) < searched.numel()
+
+
+def test_pairs_by_output_are_those_of_each_output_in_the_order_of_the_kernel() -> None:
+    pairs = pyramid().map(3, 0, 1).pairs
+    order, first = pairs.by_output
+    assert pairs.output[order].diff().min() == 0
+    assert torch.equal(order, pairs.output.argsort(stable=True))
+    assert torch.equal(pairs.output[order][first], torch.arange(pairs.n_output))
