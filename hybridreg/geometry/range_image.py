@@ -82,13 +82,13 @@ class RangeImage:
         apart = reach > 1e-6
         if not apart.any():
             raise ValueError("range image: every point lies at the viewpoint")
-        reach = reach[apart]
-        directions = ray[apart] / reach[:, None]
-        finest = _finest(points[apart], reach)
-        directions, reach = _thin(directions, reach, finest)
-        resolution = angular_resolution(directions, finest)
+        if not apart.all():
+            points, ray, reach = points[apart], ray[apart], reach[apart]
+        finest = _finest(points, reach)
+        directions, reach, cells = _thin(ray / reach[:, None], reach, finest)
+        resolution = _resolution(cells, finest)
         if resolution > 2.0 * finest:
-            directions, reach = _thin(directions, reach, 0.5 * resolution)
+            directions, reach, _ = _thin(directions, reach, 0.5 * resolution)
         tree = cKDTree(directions, balanced_tree=False, compact_nodes=False)
         return cls(np.asarray(viewpoint, dtype=np.float64), directions, reach, resolution, tree)
 
@@ -177,8 +177,10 @@ def angular_resolution(directions: Array, finest: float = _FINEST) -> float:
     While cells are finer than the gaps between rings, doubling them doubles the part of the sky that counts as
     seen; once they are wider it hardly grows. The doubling stops there.
     """
-    angle = finest
-    cells = np.unique(_cells(directions, angle))
+    return _resolution(np.unique(_cells(directions, finest)), finest)
+
+
+def _resolution(cells: Integers, angle: float) -> float:
     while angle < _COARSEST:
         coarser = np.unique(_merged(cells))
         if 4 * len(coarser) < _FILLED * len(cells):
@@ -199,8 +201,9 @@ def _merged(cells: Integers) -> Integers:
     return ((x >> 1) << 2 * _BITS) | ((y >> 1) << _BITS) | (z >> 1)
 
 
-def _thin(directions: Array, ranges: Array, angle: float) -> tuple[Array, Array]:
-    # One number to sort by: the cell, then the range in steps of a 16-millionth.
+def _thin(directions: Array, ranges: Array, angle: float) -> tuple[Array, Array, Integers]:
+    # Returns that stand for their cells, and the occupied cells, rising. One number to sort by: the cell, then the
+    # range in steps of a 16-millionth.
     steps = (ranges * ((2.0**24 - 1) / ranges.max())).astype(np.int64)
     cell = _cells(directions, angle)
     order = np.argsort((cell << 24) | steps)
@@ -209,7 +212,7 @@ def _thin(directions: Array, ranges: Array, angle: float) -> tuple[Array, Array]
     far = order[np.concatenate([change, [len(order) - 1]])]
     # The farthest return too where it lies on another surface: a cell on an edge must represent both.
     kept = np.concatenate([near, far[ranges[far] > (1.0 + _ONE_SURFACE) * ranges[near]]])
-    return directions[kept], ranges[kept]
+    return directions[kept], ranges[kept], cell[near]
 
 
 def _slope(rays: Array, normals: Array | None) -> tuple[Array, NDArray[np.bool_]]:

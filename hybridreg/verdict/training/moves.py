@@ -13,9 +13,11 @@ from __future__ import annotations
 import argparse
 import json
 import time
+from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import nullcontext
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 from unittest import mock
@@ -30,6 +32,7 @@ from hybridreg.search import rivals, settle
 from hybridreg.verdict.training.answers import Row, read
 
 TIERS = ("near", "mid", "far", "degenerate", "disjoint")
+GROUPS = (*TIERS, "hard", "real")
 # Hard pairs for each pair of a tier, and the first of their even seeds: below it they took part in fits.
 _HARD, _FIRST_SEED = 2, 300
 # Metres within which a pose of simulated and real pairs is right.
@@ -132,12 +135,13 @@ def without_entry(pipeline: Pipeline, estimate: str) -> Pipeline:
     return replace(pipeline, estimate=replace(several, of=others))
 
 
-def measured(job: Job) -> list[Row]:
-    """Rows of a pair, without each move in turn."""
+def measured(job: Job, moves: Sequence[str] = MOVES[1:]) -> list[Row]:
+    """Rows of a pair, without each of the moves in turn."""
     one = case(job)
+    measure(one, NONE)  # the first run of a pair also fills caches
     rows = [{**measure(one, NONE), "job": job}]
     easy = rows[0]["entries"] == 1
-    return rows + [measure(one, move) for move in MOVES[1:] if not (easy and move in _OF_LATER)]
+    return rows + [measure(one, move) for move in moves if not (easy and move in _OF_LATER)]
 
 
 def table(rows: list[Row]) -> str:
@@ -179,13 +183,16 @@ def main() -> None:
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--real", type=Path, default=Path("../shared/data/real"))
     parser.add_argument("--table", type=Path)
+    parser.add_argument("--groups", nargs="+", choices=GROUPS, default=GROUPS, metavar="NAME")
+    parser.add_argument("--moves", nargs="+", choices=MOVES[1:], default=MOVES[1:], metavar="NAME")
     options = parser.parse_args()
     rows = read(options.rows)
     held = {tuple(row["job"]) for row in rows if "job" in row}
     options.rows.parent.mkdir(parents=True, exist_ok=True)
-    todo = [job for job in jobs(options.pairs, options.real) if job not in held]
+    wanted = {str(options.real) if group == "real" else group for group in options.groups}
+    todo = [job for job in jobs(options.pairs, options.real) if job not in held and job[0] in wanted]
     with ProcessPoolExecutor(options.workers) as pool, options.rows.open("a") as file:
-        for made in pool.map(measured, todo):
+        for made in pool.map(partial(measured, moves=options.moves), todo):
             rows.extend(made)
             file.write("".join(json.dumps(row) + "\n" for row in made))
             file.flush()
