@@ -24,6 +24,7 @@ from hybridreg.resolution import tolerance
 from hybridreg.result import RegistrationResult
 from hybridreg.runtime import optional_packages
 from hybridreg.runtime.resources import Clock, peak_memory_mb, reset_peak_memory
+from hybridreg.runtime.threads import one_blas
 from hybridreg.scene import Scene
 from hybridreg.slots import SLOTS, checked
 from hybridreg.stage import Stage, own_params
@@ -150,7 +151,7 @@ class Pipeline(Stage):
             A stage needs a package that is not installed; the message names the extra that brings it.
         """
         reset_peak_memory()
-        with optional_packages.told("a stage of this pipeline"):
+        with optional_packages.told("a stage of this pipeline"), one_blas():
             return self.conclude(self.trace(pair, seed=seed, matches=matches), seed=seed)
 
     def conclude(self, trace: Trace, *, seed: int = 0) -> RegistrationResult:

@@ -120,28 +120,29 @@ def sweep(
     n = fft.next_fast_len(int(np.ceil(across / cell)), real=True)
     place: Array = cell * np.fft.fftfreq(n, 1.0 / n).astype(np.float64)
     spectrum = fft.rfft2(blurred(signed(target, 1.0, n, cell)), workers=n_threads())
+    # Half a turn brings cell k to cell -k - 1: a phase besides the conjugate.
+    u, v = np.fft.fftfreq(n).astype(np.float32)[:, None], np.arange(spectrum.shape[2], dtype=np.float32) / n
+    half_turn = np.exp(np.complex64(-2j * np.pi) * (u + v))
     best = BestYaws(n)
     for batch in np.array_split(yaws, -(-len(yaws) // _BATCH)):
         turned = np.stack([signed(source, np.exp(1j * yaw), n, cell) for yaw in batch])
-        product = _products(fft.rfft2(turned, workers=n_threads()), spectrum, whiten)
+        product = _products(fft.rfft2(turned, workers=n_threads()), spectrum, half_turn, whiten)
         both = np.concatenate([batch, batch + np.pi])
         for yaw, score in zip(both, fft.irfft2(product, s=(n, n), workers=n_threads()), strict=True):
             best.keep(yaw, score)
     return best.peaks(place, farthest, most, share)
 
 
-def _products(source: Complexes, target: Complexes, whiten: float) -> Complexes:
+def _products(source: Complexes, target: Complexes, half_turn: Complexes, whiten: float) -> Complexes:
     # Of spectra (yaws, layers, n, m) and (layers, n, m), summed over the layers: of the source as it is, then turned by
-    # half a turn, which brings cell k to cell -k - 1.
-    n, m = target.shape[1:]
-    u, v = np.fft.fftfreq(n).astype(np.float32)[:, None], np.arange(m, dtype=np.float32) / n
+    # half a turn, whose phase (n, m) is `half_turn`.
     as_it_is = (np.conj(source) * target).sum(axis=1)
-    half_turned = (source * target).sum(axis=1) * np.exp(np.complex64(-2j * np.pi) * (u + v))
+    half_turned = (source * target).sum(axis=1) * half_turn
     products: Complexes = np.stack([as_it_is, half_turned])
     if whiten > 0.0:
         loud = np.sqrt((np.abs(source) ** 2).sum(axis=1) * (np.abs(target) ** 2).sum(axis=0))
         products /= np.maximum(loud, _QUIET * loud.mean(axis=(1, 2), keepdims=True)) ** whiten
-    return products.reshape(-1, n, m)
+    return products.reshape(-1, *half_turn.shape)
 
 
 def _extent(view: FromAbove) -> float:

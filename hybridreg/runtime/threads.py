@@ -112,7 +112,10 @@ def _limit_environment() -> Callable[[], Any]:
     return undo
 
 
-_one_blas, _one_torch, _one_said = _Held(_limit_blas), _Held(_limit_torch), _Held(_limit_environment)
+# Matrix products of the whole process on one thread for the block. Those of a registration are small: a second thread
+# spent as much time waiting as the first spent on them, and brought nothing.
+one_blas = _Held(_limit_blas)
+_one_torch, _one_said = _Held(_limit_torch), _Held(_limit_environment)
 
 
 @contextmanager
@@ -124,7 +127,7 @@ def single() -> Iterator[None]:
     """
     with ExitStack() as held:
         held.enter_context(_limit("openmp"))
-        held.enter_context(_one_blas())
+        held.enter_context(one_blas())
         if "torch" in sys.modules:  # it takes a second and a half to load
             held.enter_context(_one_torch())
             # A thread takes over the process's number when it first asks: now, while that is one.

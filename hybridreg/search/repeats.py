@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from hybridreg.evidence.views import Views
@@ -84,7 +85,8 @@ def _grid(points: Array, cell: float, margin: int) -> tuple[NDArray[np.bool_], N
     # Cells that hold a point, with an empty margin, and the cell of the first one.
     cells = np.floor(points / cell).astype(np.int64)
     origin = cells.min(axis=0) - margin - 1
-    held = np.zeros(cells.max(axis=0) - origin + margin + 2, dtype=bool)
+    x, y, z = cells.max(axis=0) - origin + margin + 2
+    held = np.zeros((z, x, y), dtype=bool).transpose(1, 2, 0)  # what is looked up together lies together
     held[tuple((cells - origin).T)] = True
     return held, origin
 
@@ -96,8 +98,6 @@ def _met(
     cells = np.floor(arms / cell).astype(np.int64) - origin
     inside = ((cells >= reach) & (cells < np.array(held.shape) - reach)).all(axis=1)
     i, j, k = cells[inside].T
-    steps = np.arange(-reach, reach + 1)
-    hits: NDArray[np.int64] = held[
-        (i[:, None] + steps)[:, :, None], (j[:, None] + steps)[:, None, :], k[:, None, None]
-    ].sum(axis=0)
+    around = sliding_window_view(held, (2 * reach + 1, 2 * reach + 1), axis=(0, 1))
+    hits: NDArray[np.int64] = around[i - reach, j - reach, k].sum(axis=0)
     return hits
