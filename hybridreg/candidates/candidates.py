@@ -13,16 +13,13 @@ from numpy.typing import NDArray
 
 from hybridreg import fitting, registry, spec
 from hybridreg.candidates import input_mistakes, shut_out
-from hybridreg.evidence import match_agreement
 from hybridreg.evidence.log_odds import NEARLY, OK
 from hybridreg.evidence.pose_evidence import PoseEvidence
 from hybridreg.io.shipped_weights import MissingWeights
 from hybridreg.matches import Correspondences, EntryTrace, Overlap, Pose
 from hybridreg.resolution import comparable, size_ratio
 from hybridreg.scene import Scene
-from hybridreg.search.basin_hopping import hop
 from hybridreg.search.hypothesis import Hypothesis, as_hypotheses, as_pose
-from hybridreg.search.pattern_search import climb
 from hybridreg.search.ranking import HOPELESS, counted, distinct
 from hybridreg.search.settle import best_first, second_look
 from hybridreg.stage import Stage
@@ -38,20 +35,12 @@ _SURE = 0.99
 _LOOKED_AT = 8
 # How many of these are refined at most: by hand.
 _REFINED = 2
-# The best poses of all, which are looked around when no entry brought certainty: by hand.
-_LOOKED_AROUND = 4
-# Log-odds below which they are not: half a metre beside the right pose they may well be there; by hand.
-_LOST = -7.0
-# Log-odds below the best pose's from which they are not: on 200 pairs of `sim:val`, `sim:train` and hard kinds.
-_BEHIND = 6.0
 # Log-odds below which a settled pose is not refined: by hand.
 _UNREFINED = -3.0
 # Log-odds by which a pose may fall when it is refined: by hand.
 _NOISE = 1.0
-# Log-odds above which a pose is weighed, and moved to where it is likelier unless surfaces hold it: by hand.
+# Log-odds above which a pose is weighed: by hand.
 _LIKELY = 0.0
-# Information per point along the weakest direction from which surfaces hold a pose by themselves: by hand.
-_WEAK = 0.01
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -145,8 +134,7 @@ class Candidates(Stage):
         offered: list[list[Hypothesis]] = []
         missing: list[str] = []
         # A generator each, so that an entry's answer does not hang on those before it.
-        *generators, last = rng.spawn(len(self.of) + 1)
-        for entry, own in zip(self.of, generators, strict=True):
+        for entry, own in zip(self.of, rng.spawn(len(self.of)), strict=True):
             name, start = _name(entry), time.perf_counter()
             here: list[Hypothesis] = []
             problem = None
@@ -161,7 +149,7 @@ class Candidates(Stage):
                 beyond.extend(shut_out.beyond(scene, pose))
                 here = [one.but(came_from=name) for one in best_first(scene, _starts(scene, pose))]
                 offered.append(here)
-                found = _polished(scene, counted(scene, self._joined(scene, found, here), offered))
+                found = counted(scene, self._joined(scene, found, here), offered)
             if len(missing) == len(self.of):
                 raise ImportError(f"none of its {len(missing)} entries can be run here: {missing[0]}")
             traces.append(_traced(name, start, here, problem))
@@ -170,14 +158,9 @@ class Candidates(Stage):
             return
         start = time.perf_counter()
         here = [one.but(came_from=_AGAIN) for one in second_look(scene)]
-        found = counted(scene, distinct(scene, [*found, *here]), offered)
-        least = max(_LOST, found[0].log_odds - _BEHIND)
-        hopeful = [one for one in found[:_LOOKED_AROUND] if one.log_odds > least]
-        if hopeful:
-            near = distinct(scene, hop(scene, np.array([one.T for one in hopeful]), last))
-            near = [one.but(came_from=_AGAIN) for one in near]
-            found = _polished(scene, counted(scene, self._joined(scene, found, near), offered))
-            traces.append(_traced(_AGAIN, start, near, None))
+        if here:
+            found = counted(scene, self._joined(scene, found, here), offered)
+            traces.append(_traced(_AGAIN, start, here, None))
             yield found
 
     def _joined(self, scene: Scene, found: list[Hypothesis], offered: list[Hypothesis]) -> list[Hypothesis]:
@@ -205,21 +188,6 @@ def _starts(scene: Scene, pose: Pose) -> list[Hypothesis | Array]:
     starts = as_hypotheses(pose)
     allowed = [one for one, T in zip(starts, [pose.T, *pose.rivals], strict=True) if scene.pair.allows(T)]
     return (allowed or starts[:1])[:_LOOKED_AT]
-
-
-def _polished(scene: Scene, found: list[Hypothesis]) -> list[Hypothesis]:
-    # Along a direction that surfaces hardly hold, a refinement follows their noise; what else speaks holds it better.
-    first, *others = found
-    if first.log_odds <= _LIKELY or first.polished or first.at.information.weakest >= _WEAK:
-        return found
-    climbed = climb(first.at.views, first.T)
-    if climbed.by_surfaces < first.by_surfaces + _NOISE:
-        return [first.but(polished=True), *others]
-    matched = match_agreement.share(scene, climbed.T)
-    return [
-        first.but(at=climbed, by_surfaces=climbed.by_surfaces, matched=matched, settled=False, polished=True),
-        *others,
-    ]
 
 
 def _name(entry: Entry) -> str:

@@ -38,8 +38,6 @@ class Hypothesis:
         Its closeness less that of the closest hypothesis beside it, nats.
     came_from : str
         The entry that found it.
-    polished : bool
-        A pattern search has looked for a likelier pose near by already.
     """
 
     at: PoseEvidence
@@ -49,7 +47,6 @@ class Hypothesis:
     matched: float = 0.0
     closeness: float = 0.0
     came_from: str = ""
-    polished: bool = False
 
     @property
     def T(self) -> Array:

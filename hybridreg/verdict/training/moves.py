@@ -53,8 +53,6 @@ PATCHES: dict[str, tuple[Any, str, Any]] = {
     "second spectrum": (birdseye, "_LEVELLED", birdseye._LEVELLED[:1]),
     "sliding along a street": (birdseye.BirdsEye, "_slid", lambda self, source, target, voxel: []),
     "bird's-eye by sensors": (birdseye, "_leans", lambda own: False),
-    "pattern search": (candidates, "_polished", lambda scene, found: found),
-    "basin hopping": (candidates, "hop", lambda scene, poses, rng: []),
     "second look": (candidates, "second_look", lambda scene: []),
     "repeats as rivals": (rivals, "copies", lambda views, T, axes: []),
     "half turns as rivals": (rivals, "_turned", lambda own: []),
@@ -62,7 +60,7 @@ PATCHES: dict[str, tuple[Any, str, Any]] = {
 NONE = "none"
 MOVES = (NONE, *PATCHES, *ENTRIES)
 # Those that a pair is spared which the first entry answers beyond doubt.
-_OF_LATER = ("pattern search", "basin hopping", "second look", *ENTRIES)
+_OF_LATER = ("second look", *ENTRIES)
 
 
 # A group, or the folder of real pairs, and which of its pairs.
