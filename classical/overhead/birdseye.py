@@ -37,8 +37,6 @@ _SHARE = 0.5
 # Exponents by which the spectra are whitened: at first by half, so that the few objects on a field count beside a wall
 # or a wood, and not at all when no pose stands out then; by hand.
 _LEVELLED = (0.5, 0.0)
-# The same in the second look; by hand.
-_WHITEN = (0.0, 0.75)
 # Peaks examined first; the others only where none of these is beyond doubt; by hand.
 _FIRST = 10
 # Log-odds of the best pose of the run below which no other spectrum finds the right one: of the pairs of `sim:val` and
@@ -78,7 +76,7 @@ class BirdsEye(Stage):
     tries : int
         Poses settled and ranked, at most.
     again : bool
-        Search a second and a third time, with other spectra, where no pose stands out at first.
+        Search a second time, with another spectrum, where no pose stands out at first.
     """
 
     vertical: Literal["ground", "sensor", "both"] = "ground"
@@ -137,12 +135,7 @@ class BirdsEye(Stage):
                     return found
             if Found.of(scene).highest < _LOST:
                 return found
-        if not found or not self.again:
-            return found
-        # The best pose levels the clouds better than their grounds do.
-        T_level_source = _centred(T_level_target @ found[0].T, own.source.centre)
-        again = self._slid(self._view(own, "source", T_level_source, voxel), target, voxel)
-        return found + best_first(scene, [T_target_level @ M @ T_level_source for M in again])
+        return found
 
     def _view(self, own: Scene, side: Side, T_level_cloud: Array, voxel: float) -> FromAbove:
         level = own.level(side)
@@ -167,26 +160,6 @@ class BirdsEye(Stage):
             source, target, peaks, cell=voxel, step_deg=0.4 * _YAW_STEP_DEG, step=0.5 * _COARSE * voxel
         )
         return found.matrices
-
-    def _slid(self, source: FromAbove, target: FromAbove, voxel: float) -> list[Array]:
-        """Poses at the yaw that the views have, and half a turn from it: what lies along a street or a corridor decides
-        where, and only a fine map shows it."""
-        if len(source.filled.layer) == 0:
-            return []
-        return [
-            M
-            for whiten in _WHITEN
-            for M in sweep(
-                source,
-                target,
-                cell=voxel,
-                yaws=np.zeros(1),
-                farthest=self.farthest * voxel,
-                most=self.tries,
-                share=0.0,
-                whiten=whiten,
-            ).matrices
-        ]
 
 
 _SIDES: tuple[Side, Side] = ("source", "target")
