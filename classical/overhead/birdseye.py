@@ -37,6 +37,8 @@ _SHARE = 0.5
 # Exponents by which the spectra are whitened: at first by half, so that the few objects on a field count beside a wall
 # or a wood, and not at all when no pose stands out then; by hand.
 _LEVELLED = (0.5, 0.0)
+# The same along a street; by hand.
+_WHITEN = (0.0, 0.75)
 # Peaks examined first; the others only where none of these is beyond doubt; by hand.
 _FIRST = 10
 # Log-odds of the best pose of the run below which no other spectrum finds the right one: of the pairs of `sim:val` and
@@ -76,7 +78,8 @@ class BirdsEye(Stage):
     tries : int
         Poses settled and ranked, at most.
     again : bool
-        Search a second time, with another spectrum, where no pose stands out at first.
+        Search a second time, with another spectrum, where no pose stands out at first; where one does but is not
+        beyond doubt, look along the street, and from its other end.
     """
 
     vertical: Literal["ground", "sensor", "both"] = "ground"
@@ -124,6 +127,19 @@ class BirdsEye(Stage):
         if len(source.filled.layer) == 0 or len(target.filled.layer) == 0:
             return []
         T_target_level = se3.inverse(T_level_target)
+        found = self._searched(scene, source, target, voxel, frames)
+        if not self.again or not found or not NEARLY <= found[0].log_odds < BEYOND_DOUBT:
+            return found
+        # A street looks alike from its other end and farther along: what could be mistaken for the pose must be known.
+        T_level_source = _centred(T_level_target @ found[0].T, own.source.centre)
+        along = self._slid(self._view(own, "source", T_level_source, voxel), target, voxel)
+        return found + best_first(scene, [T_target_level @ M @ T_level_source for M in along])
+
+    def _searched(
+        self, scene: Scene, source: FromAbove, target: FromAbove, voxel: float, frames: Sequence[Array]
+    ) -> list[Hypothesis]:
+        T_level_source, T_level_target = frames
+        T_target_level = se3.inverse(T_level_target)
         found: list[Hypothesis] = []
         for levelled in _LEVELLED[: None if self.again else 1]:
             poses = [
@@ -160,6 +176,26 @@ class BirdsEye(Stage):
             source, target, peaks, cell=voxel, step_deg=0.4 * _YAW_STEP_DEG, step=0.5 * _COARSE * voxel
         )
         return found.matrices
+
+    def _slid(self, source: FromAbove, target: FromAbove, voxel: float) -> list[Array]:
+        """Poses at the yaw that the views have, and half a turn from it: what lies along a street or a corridor decides
+        where, and only a fine map shows it."""
+        if len(source.filled.layer) == 0:
+            return []
+        return [
+            M
+            for whiten in _WHITEN
+            for M in sweep(
+                source,
+                target,
+                cell=voxel,
+                yaws=np.zeros(1),
+                farthest=self.farthest * voxel,
+                most=self.tries,
+                share=0.0,
+                whiten=whiten,
+            ).matrices
+        ]
 
 
 _SIDES: tuple[Side, Side] = ("source", "target")

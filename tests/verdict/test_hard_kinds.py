@@ -11,6 +11,8 @@ from made_places import Made
 
 from hybridreg.candidates import input_mistakes
 from hybridreg.classical.voxel import VoxelGrid
+from hybridreg.data import hard
+from hybridreg.data.hard import is_right
 from hybridreg.evidence import views
 from hybridreg.evidence.agreement import compare
 from hybridreg.evidence.orientation import overturned
@@ -136,3 +138,12 @@ def test_the_tolerance_follows_the_size_of_the_scene(crossing: Made) -> None:
     assert tolerance(pair.source, pair.target) == (2.0, 0.5)
     small = Pair.of(pair.source.points / 500.0, pair.target.points / 500.0)
     assert tolerance(small.source, small.target).metres < 0.005
+
+
+def test_the_other_copy_of_a_doubled_map_is_found_where_only_a_slide_along_it_shows_it() -> None:
+    # Of the bird's-eye peaks none lay near it.
+    doubled = hard.sample("doubled", 207)
+    result = Pipeline.preset("default").run(Pair.of(doubled.source, doubled.target))
+    assert is_right(doubled, result.transformation)
+    assert result.verdict == "doubtful"
+    assert any(is_right(doubled, T) for T in result.rivals)
