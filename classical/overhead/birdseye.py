@@ -37,8 +37,6 @@ _SHARE = 0.5
 # Exponents by which the spectra are whitened: at first by half, so that the few objects on a field count beside a wall
 # or a wood, and not at all when no pose stands out then; by hand.
 _LEVELLED = (0.5, 0.0)
-# The same along a street; by hand.
-_WHITEN = (0.0, 0.75)
 # Peaks examined first; the others only where none of these is beyond doubt; by hand.
 _FIRST = 10
 # Log-odds of the best pose of the run below which no other spectrum finds the right one: of the pairs of `sim:val` and
@@ -182,20 +180,17 @@ class BirdsEye(Stage):
         where, and only a fine map shows it."""
         if len(source.filled.layer) == 0:
             return []
-        return [
-            M
-            for whiten in _WHITEN
-            for M in sweep(
-                source,
-                target,
-                cell=voxel,
-                yaws=np.zeros(1),
-                farthest=self.farthest * voxel,
-                most=self.tries,
-                share=0.0,
-                whiten=whiten,
-            ).matrices
-        ]
+        peaks = sweep(
+            source,
+            target,
+            cell=voxel,
+            yaws=np.zeros(1),
+            farthest=self.farthest * voxel,
+            most=_FIRST,
+            share=0.0,
+            whiten=_LEVELLED[0],
+        )
+        return peaks.matrices
 
 
 _SIDES: tuple[Side, Side] = ("source", "target")
