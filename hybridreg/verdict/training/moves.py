@@ -51,6 +51,7 @@ PATCHES: dict[str, tuple[Any, str, Any]] = {
     ),
     "GICP": (candidates.Candidates, "_refined", lambda self, scene, one: one),
     "second spectrum": (birdseye, "_LEVELLED", birdseye._LEVELLED[:1]),
+    "sliding along a street": (birdseye.BirdsEye, "_slid", lambda self, source, target, voxel: []),
     "bird's-eye by sensors": (birdseye, "_leans", lambda own: False),
     "second look": (candidates, "second_look", lambda scene: []),
     "repeats as rivals": (rivals, "copies", lambda views, T, axes: []),
