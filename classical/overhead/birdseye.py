@@ -124,25 +124,20 @@ class BirdsEye(Stage):
         source, target = (self._view(own, s, T, voxel) for s, T in zip(_SIDES, frames, strict=True))
         if len(source.filled.layer) == 0 or len(target.filled.layer) == 0:
             return []
-        T_target_level = se3.inverse(T_level_target)
         found = self._searched(scene, source, target, voxel, frames)
         if not self.again or not found or not NEARLY <= found[0].log_odds < BEYOND_DOUBT:
             return found
         # A street looks alike from its other end and farther along: what could be mistaken for the pose must be known.
         T_level_source = _centred(T_level_target @ found[0].T, own.source.centre)
         along = self._slid(self._view(own, "source", T_level_source, voxel), target, voxel)
-        return found + best_first(scene, [T_target_level @ M @ T_level_source for M in along])
+        return found + best_first(scene, _unlevelled(along, (T_level_source, T_level_target)))
 
     def _searched(
         self, scene: Scene, source: FromAbove, target: FromAbove, voxel: float, frames: Sequence[Array]
     ) -> list[Hypothesis]:
-        T_level_source, T_level_target = frames
-        T_target_level = se3.inverse(T_level_target)
         found: list[Hypothesis] = []
         for levelled in _LEVELLED[: None if self.again else 1]:
-            poses = [
-                T_target_level @ M @ T_level_source for M in self._planar(source, target, voxel, levelled)
-            ]
+            poses = _unlevelled(self._planar(source, target, voxel, levelled), frames)
             for some, plain in ((poses[:_FIRST], BEYOND_DOUBT), (poses[_FIRST:], NEARLY)):
                 found = best([*found, *best_first(scene, some)])
                 if found and found[0].log_odds >= plain:
@@ -194,6 +189,13 @@ class BirdsEye(Stage):
 
 
 _SIDES: tuple[Side, Side] = ("source", "target")
+
+
+def _unlevelled(motions: Sequence[Array], frames: Sequence[Array]) -> list[Array]:
+    # Motions along the ground as T_target_source.
+    T_level_source, T_level_target = frames
+    T_target_level = se3.inverse(T_level_target)
+    return [T_target_level @ M @ T_level_source for M in motions]
 
 
 def _centred(T_level_cloud: Array, place: Array) -> Array:

@@ -4,8 +4,8 @@
     python -m hybridreg.verdict.training.moves --pairs 20 --rows runs/moves.jsonl --table runs/moves.md
 
 Tiers of `sim:val`, the hard kinds with even seeds, and real pairs where they lie beside the checkout; no test pair.
-The rows of a pair are appended together, so that an interrupted run goes on. Seconds are processor seconds. Where the
-first entry is certain, only the moves that it makes are switched off.
+The rows of a pair are appended together, so that an interrupted run goes on; other `--moves` need other `--rows`.
+Seconds are processor seconds. Where the first entry is certain, only the moves that it makes are switched off.
 """
 
 from __future__ import annotations
