@@ -18,8 +18,8 @@ Floats = NDArray[np.float32]
 COARSE = 2.0
 # Degrees between yaws; by hand.
 _YAW_STEP_DEG = 2.0
-# Yaws at once: for memory.
-_BATCH = 4
+# Yaws at once, and as many half a turn beyond: for memory.
+_BATCH = 2
 # Fewest common cells; by hand.
 _FEWEST = 25
 
@@ -40,27 +40,34 @@ def search(source: Relief, target: Relief, farthest: float, most: int) -> list[A
     from scipy import fft
 
     cell = COARSE * target.cell
-    xs, xt = (se3.apply(r.T_level_cloud, r.places)[:, :2] for r in (source, target))
+    (xs, hs), (xt, ht) = ((se3.apply(r.T_level_cloud, r.places)[:, :2], r.heights) for r in (source, target))
     if min(len(xs), len(xt)) < _FEWEST:
         return []
-    # Wrapped round: a shift of at most `farthest` may not bring one end of a map upon the other.
-    reach = max(float(np.hypot(*x.T).max()) for x in (xs, xt))
-    n = fft.next_fast_len(int(np.ceil((2.0 * reach + min(farthest, 2.0 * reach)) / cell)) + 2, real=True)
+    # What no shift brings upon the other map is left out, and no shift may bring one end of a map upon the other.
+    far_s, far_t = (np.hypot(*x.T) for x in (xs, xt))
+    near_s, near_t = far_s <= far_t.max() + farthest, far_t <= far_s.max() + farthest
+    (xs, hs), (xt, ht) = (xs[near_s], hs[near_s]), (xt[near_t], ht[near_t])
+    reaches = far_s.max(where=near_s, initial=0.0), far_t.max(where=near_t, initial=0.0)
+    n = fft.next_fast_len(int(np.ceil((sum(reaches) + min(farthest, sum(reaches))) / cell)) + 3, real=True)
     place = cell * np.fft.fftfreq(n, 1.0 / n)
-    height, square, known = fft.rfft2(_maps(xt, target.heights, n, cell), workers=n_threads())
-    best = BestYaws(n)
-    yaws = np.arange(0.0, 360.0, _YAW_STEP_DEG)
+    height, square, known = fft.rfft2(_maps(xt, ht, n, cell), workers=n_threads())
+    best = BestYaws(place, farthest)
+    yaws = np.radians(np.arange(0.0, 180.0, _YAW_STEP_DEG))
     for batch in np.array_split(yaws, -(-len(yaws) // _BATCH)):
-        turned = [_maps(xs @ se3.yaw(yaw)[:2, :2].T, source.heights, n, cell) for yaw in batch]
-        h, q, k = np.moveaxis(np.conj(fft.rfft2(np.stack(turned), workers=n_threads())), 1, 0)
+        turned = fft.rfft2(
+            np.stack([_maps(xs @ se3.yaw(yaw)[:2, :2].T, hs, n, cell) for yaw in np.degrees(batch)]),
+            workers=n_threads(),
+        )
+        # The half turn beyond each yaw has the conjugate spectra.
+        h, q, k = np.moveaxis(np.concatenate([np.conj(turned), turned]), 1, 0)
         products = np.stack([h * height, q * known, k * square, k * known])
-        across, own, other, cells = fft.irfft2(products, s=(n, n), workers=n_threads())
+        across, own, other, cells = best.near(fft.irfft2(products, s=(n, n), workers=n_threads()))
         loud = np.sqrt(np.maximum(own * other, np.finfo(np.float32).tiny))
         speaks = (cells > _FEWEST - 0.5) & (across > 0.0)
         told = np.where(speaks, nats(cells, across / loud), -np.inf).astype(np.float32)
-        for yaw, score in zip(batch, told, strict=True):
-            best.keep(float(np.radians(yaw)), score)
-    return best.peaks(place, farthest, most, share=0.0).matrices
+        for yaw, score in zip(np.concatenate([batch, batch + np.pi]), told, strict=True):
+            best.keep(float(yaw), score)
+    return best.peaks(most, share=0.0).matrices
 
 
 def _maps(places: Array, heights: Array, n: int, cell: float) -> Floats:

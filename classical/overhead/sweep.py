@@ -46,32 +46,43 @@ class Planar(NamedTuple):
 
 
 class BestYaws:
-    """The best score of each shift (n, n) and its yaw, for each sector of yaws."""
+    """The best score of each shift and its yaw, for each sector of yaws.
 
-    def __init__(self, n: int) -> None:
-        self._score = np.full((_SECTORS, n, n), -np.inf, dtype=np.float32)
-        self._yaw = np.zeros((_SECTORS, n, n))
+    `place` (n,): metres of a map's rows, which wrap round; shifts longer than `farthest` metres are left out.
+    """
+
+    def __init__(self, place: Array, farthest: float) -> None:
+        # And those just beyond, so that the longest shifts have neighbours.
+        self._rows = np.flatnonzero(np.abs(place) < farthest + 2.0 * place[1])
+        self._place = place[self._rows]
+        self._too_far = np.hypot(self._place[:, None], self._place) > farthest
+        self._score = np.full((_SECTORS, *self._too_far.shape), -np.inf, dtype=np.float32)
+        self._yaw = np.zeros(self._score.shape)
+
+    def near(self, maps: Floats) -> Floats:
+        """Of maps (..., n, n) the shifts (..., m, m) that count."""
+        return maps.take(self._rows, axis=-2).take(self._rows, axis=-1)
 
     def keep(self, yaw: float, score: Floats) -> None:
-        """Take in the scores (n, n) of one yaw, radians in [0, 2 pi)."""
+        """Take in the scores (m, m) of one yaw, radians in [0, 2 pi)."""
         sector = int(_SECTORS * yaw / (2.0 * np.pi))
         better = score > self._score[sector]
         np.copyto(self._score[sector], score, where=better)
         np.copyto(self._yaw[sector], yaw, where=better)
 
-    def peaks(self, place: Array, farthest: float, most: int, share: float) -> Planar:
-        """Shifts that score higher than those around them; `place` (n,) metres of a row, the rest as in `sweep`."""
+    def peaks(self, most: int, share: float) -> Planar:
+        """Shifts that score higher than those around them; `most` and `share` as in `sweep`."""
         from scipy.ndimage import maximum_filter
 
         best = self._score
-        best[:, np.hypot(place[:, None], place) > farthest] = -np.inf
+        best[:, self._too_far] = -np.inf
         peak = (best == maximum_filter(best, (1, 3, 3), mode="wrap")) & np.isfinite(best)
         sector, i, j = np.nonzero(peak)
         score = best[sector, i, j].astype(np.float64)
         first = np.argsort(-score, kind="stable")[:most]
         first = first[score[first] >= share * score[first[:1]]]
         sector, i, j = sector[first], i[first], j[first]
-        return Planar(self._yaw[sector, i, j], place[i] + 1j * place[j], score[first])
+        return Planar(self._yaw[sector, i, j], self._place[i] + 1j * self._place[j], score[first])
 
 
 def sweep(
@@ -123,14 +134,15 @@ def sweep(
     # Half a turn brings cell k to cell -k - 1: a phase besides the conjugate.
     u, v = np.fft.fftfreq(n).astype(np.float32)[:, None], np.arange(spectrum.shape[2], dtype=np.float32) / n
     half_turn = np.exp(np.complex64(-2j * np.pi) * (u + v))
-    best = BestYaws(n)
+    best = BestYaws(place, farthest)
     for batch in np.array_split(yaws, -(-len(yaws) // _BATCH)):
         turned = np.stack([signed(source, np.exp(1j * yaw), n, cell) for yaw in batch])
         product = _products(fft.rfft2(turned, workers=n_threads()), spectrum, half_turn, whiten)
         both = np.concatenate([batch, batch + np.pi])
-        for yaw, score in zip(both, fft.irfft2(product, s=(n, n), workers=n_threads()), strict=True):
+        scores = best.near(fft.irfft2(product, s=(n, n), workers=n_threads()))
+        for yaw, score in zip(both, scores, strict=True):
             best.keep(yaw, score)
-    return best.peaks(place, farthest, most, share)
+    return best.peaks(most, share)
 
 
 def _products(source: Complexes, target: Complexes, half_turn: Complexes, whiten: float) -> Complexes:
