@@ -15,6 +15,7 @@ from hybridreg.cloud import PointCloud
 from hybridreg.geometry.voxel_cells import voxel_centroids
 from hybridreg.pair import Pair
 from hybridreg.resolution import comparable, default_voxel
+from hybridreg.runtime.side_by_side import side_by_side
 from hybridreg.scene import Level, Scene
 from hybridreg.stage import Stage
 from hybridreg.thinning import thinned
@@ -68,16 +69,16 @@ class VoxelGrid(Stage):
             return _each_by_itself(pair)
         voxel = self.voxel or default_voxel(pair.source, pair.target)
         reached = voxel
-        points = [_cells(cloud, voxel) for cloud in clouds]
+        points = side_by_side(partial(_cells, voxel), *clouds)
         at = [voxel, voxel]
         while self.voxel is None and (most := max(map(len, points))) > _MOST_POINTS:
             voxel = _two_digits_up(voxel * (most / _MOST_POINTS) ** 0.5)
             for k, cloud in enumerate(clouds):
                 if len(points[k]) > _MOST_POINTS:
-                    points[k], at[k] = _cells(cloud, voxel), voxel
+                    points[k], at[k] = _cells(voxel, cloud), voxel
         for k, cloud in enumerate(clouds):  # one of few points follows when the voxel is found
             if at[k] != voxel:
-                points[k] = _cells(cloud, voxel)
+                points[k] = _cells(voxel, cloud)
         spacing = [voxel, voxel]
         if self.density == "match":
             dense = int(np.argmax([len(p) for p in points]))
@@ -115,7 +116,7 @@ def _each_by_itself(pair: Pair) -> Scene:
     return scene
 
 
-def _cells(cloud: PointCloud, voxel: float) -> Array:
+def _cells(voxel: float, cloud: PointCloud) -> Array:
     return cloud.once(("cells", voxel), partial(voxel_centroids, cloud.points, voxel))
 
 

@@ -125,8 +125,8 @@ class PointCloud:
         )
 
     def keeping(self) -> PointCloud:
-        """The cloud as a prepared target: where it was seen from is settled, and `once` keeps what it makes."""
-        return replace(self, said=self.seen, kept={})
+        """The cloud as a prepared target: `once` keeps what it makes."""
+        return replace(self, kept={})
 
     def once(self, key: Hashable, make: Callable[[], Value]) -> Value:
         """`make()`; of a prepared target what it gave the first time."""

@@ -20,6 +20,7 @@ from hybridreg.geometry.voxel_cells import voxel_centroids
 from hybridreg.matches import Correspondences
 from hybridreg.pair import Pair
 from hybridreg.runtime.resources import Clock
+from hybridreg.runtime.side_by_side import side_by_side
 from hybridreg.thinning import thinned
 
 Array = NDArray[np.float64]
@@ -117,9 +118,10 @@ class Scene:
     def on_cells(cls, pair: Pair, voxel: float) -> Scene:
         """Both clouds as the centroids of a grid's cells of one edge, metres."""
         clouds = thinned(pair, voxel)
-        source, target = (
-            cloud.once(("level", voxel), partial(Level.on_cells, cloud, voxel))
-            for cloud in (clouds.source, clouds.target)
+        source, target = side_by_side(
+            lambda cloud: cloud.once(("level", voxel), partial(Level.on_cells, cloud, voxel)),
+            clouds.source,
+            clouds.target,
         )
         return cls(pair=clouds, source=source, target=target)
 

@@ -11,7 +11,7 @@ from hybridreg.geometry.voxel_cells import voxel_cells, voxel_centroids
 from hybridreg.pair import Pair
 from hybridreg.resolution import comparable, default_voxel
 
-_MANY = 1_500_000  # points above which a cloud is thinned; by hand
+_MANY = 900_000  # points above which a cloud is thinned; by hand
 # Cells kept along the edge of a voxel: surfaces are fitted, and free space is tested, at no less than half a voxel.
 _CELLS = 4
 # Clouds of very different extent have a voxel each, as in `hybridreg.resolution`.
@@ -21,7 +21,7 @@ _SPREAD = 0.35
 
 
 def thinned(pair: Pair, voxel: float | None) -> Pair:
-    """The pair, each of its clouds of more than 1.5 million points replaced by the centroids of its fine cells.
+    """The pair, each of its clouds of more than 900,000 points replaced by the centroids of its fine cells.
 
     Parameters
     ----------

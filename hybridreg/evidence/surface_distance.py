@@ -8,7 +8,6 @@ surfaces as fine as the clouds show them; normals are estimated where a pose ask
 
 from __future__ import annotations
 
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -21,7 +20,7 @@ from hybridreg.geometry import se3
 from hybridreg.geometry.extent import bounds, reach
 from hybridreg.geometry.point_to_plane import descend
 from hybridreg.pair import Pair
-from hybridreg.runtime.cores import n_threads
+from hybridreg.runtime.side_by_side import side_by_side
 
 Array = NDArray[np.float64]
 
@@ -104,11 +103,10 @@ class FineSurfaces(NamedTuple):
 
     @classmethod
     def of(cls, pair: Pair) -> FineSurfaces:
-        """Made side by side: most of it is sorting and trees, which each take one thread."""
+        """Made side by side: most of it is sorting and trees."""
         clouds = (pair.source, pair.target)
         scale = min(1.0, *(reach(cloud.radii) / _FROM for cloud in clouds)) or 1.0
-        with ThreadPoolExecutor(min(2, n_threads())) as pool:
-            return cls(*pool.map(lambda cloud: _surfaces(cloud, scale), clouds))
+        return cls(*side_by_side(lambda cloud: _surfaces(cloud, scale), *clouds))
 
 
 def closeness(fine: FineSurfaces, T_target_source: Array, stride: int = 1) -> float:

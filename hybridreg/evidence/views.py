@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cached_property, partial
 
@@ -11,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from hybridreg.cloud import PointCloud
 from hybridreg.evidence.surface_distance import FineSurfaces
 from hybridreg.geometry import ground, normals
 from hybridreg.geometry.ground import Ground
@@ -18,7 +18,7 @@ from hybridreg.geometry.ground_relief import Relief
 from hybridreg.geometry.main_axes import balanced
 from hybridreg.geometry.range_image import RangeImage, RangeImages
 from hybridreg.resolution import default_voxel, map_cell
-from hybridreg.runtime.cores import n_threads
+from hybridreg.runtime.side_by_side import side_by_side
 from hybridreg.scene import Scene, Side
 
 Array = NDArray[np.float64]
@@ -30,6 +30,7 @@ _NEAR_ENOUGH = 1.5
 _MOST_POINTS = 20_000
 # Points that are sampled evenly for comparison: a share of 3,000 is good to one percent.
 _N_ASKED = 3_000
+_SIDES: tuple[Side, Side] = ("source", "target")
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -106,13 +107,14 @@ def of(scene: Scene) -> Views:
 def _both(scene: Scene) -> Views:
     spacing = default_voxel(scene.pair.source, scene.pair.target)
     on_grid = scene.at(map_cell(scene.pair.source, scene.pair.target))
-    # Side by side: most of it is sorting and trees, which each take one thread.
-    with ThreadPoolExecutor(min(2, n_threads())) as pool:
-        source = pool.submit(_view, scene, "source", spacing, on_grid)
-        key = ("view", spacing, scene.target.spacing, on_grid.spacing, scene.pair.gravity)
-        make = partial(_view, scene, "target", spacing, on_grid)
-        target = pool.submit(scene.pair.target.once, key, make)
-        return Views(scene=scene, source=source.result(), target=target.result(), spacing=spacing)
+
+    def view(side: Side) -> View:
+        key = ("view", spacing, scene.level(side).spacing, on_grid.spacing, scene.pair.gravity)
+        cloud: PointCloud = getattr(scene.pair, side)
+        return cloud.once(key, partial(_view, scene, side, spacing, on_grid))
+
+    source, target = side_by_side(view, *_SIDES)  # most of it is sorting and trees
+    return Views(scene=scene, source=source, target=target, spacing=spacing)
 
 
 def _view(scene: Scene, side: Side, wanted: float, on_grid: Scene) -> View:
