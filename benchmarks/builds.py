@@ -35,12 +35,13 @@ _WORKER = """
 import json, sys, time
 import numpy as np
 import hybridreg as hr
+pipeline = hr.Pipeline.preset(sys.argv[1])
 for line in sys.stdin:
     with np.load(line.strip()) as clouds:
         source, target = clouds["source"], clouds["target"]
     start = time.perf_counter()
     try:
-        result = hr.register(source, target)
+        result = pipeline(source, target)
         told = [time.perf_counter() - start, result.verdict, result.transformation.tolist()]
     except ValueError as error:
         told = [time.perf_counter() - start, "refused", str(error)]
@@ -61,11 +62,11 @@ class Answer(NamedTuple):
 
 
 class Build:
-    """A checkout's `register` in a process of its own."""
+    """A preset of a checkout, in a process of its own."""
 
-    def __init__(self, checkout: Path) -> None:
+    def __init__(self, checkout: Path, preset: str) -> None:
         environment = {**os.environ, "PYTHONPATH": str(checkout)}
-        command = [sys.executable, "-W", "ignore", "-c", _WORKER]
+        command = [sys.executable, "-W", "ignore", "-c", _WORKER, preset]
         self._process = subprocess.Popen(
             command, cwd=checkout, env=environment, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
         )
@@ -132,9 +133,13 @@ def main() -> None:
         "--hard", default="", metavar="SEEDS", help="seeds of hard kinds, with commas between"
     )
     parser.add_argument("--kinds", nargs="*", default=hard.KINDS, choices=hard.KINDS, metavar="KIND")
+    parser.add_argument("--preset", default="default")
     options = parser.parse_args()
     seeds = [int(seed) for seed in options.hard.split(",") if seed]
-    builds = {"before": Build(options.before.resolve()), "now": Build(ROOT)}
+    builds = {
+        name: Build(checkout, options.preset)
+        for name, checkout in (("before", options.before.resolve()), ("now", ROOT))
+    }
     rows: list[tuple[Sample, dict[str, Answer]]] = []
     with TemporaryDirectory() as folder:
         for k, one in enumerate(pairs(options.data, seeds, options.kinds)):

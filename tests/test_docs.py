@@ -24,6 +24,7 @@ REPORTS = (
     "methods.md",
     "networks.md",
     "published.md",
+    "systems.md",
     "simulator.md",
     "training.md",
     "benchmarks.md",
