@@ -26,6 +26,7 @@ from numpy.typing import NDArray
 
 from hybridreg.data import hard, open_dataset
 from hybridreg.data.hard import Sample
+from hybridreg.geometry import se3
 
 ROOT = Path(__file__).resolve().parents[1]
 Array = NDArray[np.float64]
@@ -85,22 +86,23 @@ class Build:
         return back.readline()
 
 
-def pairs(data: Sequence[str], seeds: Sequence[int], kinds: Sequence[str]) -> Iterator[Sample]:
-    """Pairs of data sets, and hard kinds."""
+def pairs(data: Sequence[str], seeds: Sequence[int], kinds: Sequence[str], yaws: int) -> Iterator[Sample]:
+    """Pairs of data sets, each `yaws` times with its source turned about z, or as it is for 0; and hard kinds."""
     for name in data:
-        for one in open_dataset(name):
-            truths = () if "disjoint" in name else (one.T_target_source,)
-            clouds = (cloud.points + cloud.offset for cloud in (one.pair.source, one.pair.target))
-            source, target = clouds
-            yield Sample(
-                kind=name,
-                name=one.pair.id,
-                source=source,
-                target=target,
-                truths=truths,
-                metres=0.5,
-                solvable=bool(truths),
-            )
+        for k, one in enumerate(open_dataset(name)):
+            source, target = (cloud.points + cloud.offset for cloud in (one.pair.source, one.pair.target))
+            for yaw in np.random.default_rng(k).uniform(0.0, 360.0, yaws) if yaws else [0.0]:
+                T = se3.yaw(float(yaw))
+                truths = () if "disjoint" in name else (one.T_target_source @ se3.inverse(T),)
+                yield Sample(
+                    kind=name,
+                    name=f"{one.pair.id} {yaw:.0f}",
+                    source=se3.apply(T, source),
+                    target=target,
+                    truths=truths,
+                    metres=0.5,
+                    solvable=bool(truths),
+                )
     yield from (hard.sample(kind, seed) for seed in seeds for kind in kinds)
 
 
@@ -133,6 +135,9 @@ def main() -> None:
         "--hard", default="", metavar="SEEDS", help="seeds of hard kinds, with commas between"
     )
     parser.add_argument("--kinds", nargs="*", default=hard.KINDS, choices=hard.KINDS, metavar="KIND")
+    parser.add_argument(
+        "--yaws", type=int, default=0, help="random turns of each source about z; 0: as it is"
+    )
     parser.add_argument("--preset", default="default")
     options = parser.parse_args()
     seeds = [int(seed) for seed in options.hard.split(",") if seed]
@@ -142,7 +147,7 @@ def main() -> None:
     }
     rows: list[tuple[Sample, dict[str, Answer]]] = []
     with TemporaryDirectory() as folder:
-        for k, one in enumerate(pairs(options.data, seeds, options.kinds)):
+        for k, one in enumerate(pairs(options.data, seeds, options.kinds, options.yaws)):
             file = Path(folder) / f"{k}.npz"
             np.savez(file, source=one.source, target=one.target)
             if not rows:  # imports and weights are not measured
