@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybridreg.cloud import PointCloud
+from hybridreg.flat_scans import raised
 from hybridreg.geometry.voxel_cells import voxel_centroids
 from hybridreg.pair import Pair
 from hybridreg.resolution import comparable, default_voxel
@@ -53,8 +54,13 @@ class VoxelGrid(Stage):
             raise ValueError(f"density={self.density!r} must be 'keep' or 'match'")
 
     def __call__(self, pair: Pair) -> Scene:
-        given, pair = pair, thinned(pair, self.voxel)
+        given = raised(pair)
+        flat, pair = given is not pair, thinned(given, self.voxel)
         scene = self._scene(pair)
+        if flat:
+            scene.note(
+                "both clouds are flat 2-D scans: walls were drawn through their points, a floor under their beams"
+            )
         for name, cloud, all_of_it in (
             ("source", pair.source, given.source),
             ("target", pair.target, given.target),

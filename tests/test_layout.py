@@ -16,6 +16,7 @@ ORDER = (
     ("geometry",),
     (
         "cloud",
+        "flat_scans",
         "frames",
         "gate",
         "matches",
