@@ -155,7 +155,10 @@ def main() -> None:
             answers = {name: build.register(file) for name, build in builds.items()}
             file.unlink()
             rows.append((one, answers))
-            told = (f"{name} {a.seconds:.2f} s {a.verdict}" for name, a in answers.items())
+            told = (
+                f"{name} {a.seconds:.2f} s {'right' if a.is_right(one) else 'wrong'} {a.verdict}"
+                for name, a in answers.items()
+            )
             print(f"{one.name:32s} {len(one.source):7d} {len(one.target):7d}  {', '.join(told)}", flush=True)
     print(summary(rows))
 

@@ -15,19 +15,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybridreg.cloud import PointCloud
-from hybridreg.geometry.extent import reach, sample
+from hybridreg.geometry.extent import reach
 from hybridreg.geometry.viewpoint import Seen
 from hybridreg.pair import Pair
 from hybridreg.resolution import default_voxel
 
 Array = NDArray[np.float64]
 
-# Farthest that a point, or the sensor, lies off the plane of a flat scan: of the cloud's extent. Drivers write zeros.
-_THIN = 1e-4
+# Farthest that nearly all points, and the sensor, lie off the plane of a flat scan: of the cloud's extent; by hand.
+_THIN = 1e-3
+_NEARLY_ALL = 0.98
 # The sensor's height over the floor, and the walls' over the sensor: of the smaller cloud's extent; by hand.
 _HEIGHT = 1.0 / 6.0
 # Beams under which floor is drawn, at most; by hand.
 _BEAMS = 3_000
+# Without beams: points of floor beside each point, and how far beside it, steps; by hand.
+_BESIDE, _ASIDE = 12, 8.0
 # Unevenness of the floor, steps, to either side, another one for each cloud: of two even floors the last digits would
 # pass for a relief that they have in common; by hand.
 _UNEVEN = 0.1
@@ -35,45 +38,72 @@ _UNEVEN = 0.1
 
 def raised(pair: Pair) -> Pair:
     """The pair, both of its clouds with walls and floor where both are flat scans; as it is otherwise."""
-    ups = [_normal(cloud) for cloud in (pair.source, pair.target)]
+    clouds = (pair.source, pair.target)
+    ups = [_normal(cloud) for cloud in clouds]
     if ups[0] is None or ups[1] is None:
         return pair
-    height = _HEIGHT * min(reach(cloud.radii) for cloud in (pair.source, pair.target))
-    step = default_voxel(pair.source, pair.target)
-    return pair.with_clouds(
-        _raised(pair.source, ups[0], height, step, np.random.default_rng(0)),
-        _raised(pair.target, ups[1], height, step, np.random.default_rng(1)),
+    height = _HEIGHT * min(reach(cloud.radii) for cloud in clouds)
+    step = default_voxel(*clouds)
+    source, target = (
+        _raised(cloud, up, height, step, np.random.default_rng(k))
+        for k, (cloud, up) in enumerate(zip(clouds, ups, strict=True))
+        if up is not None
     )
+    return pair.with_clouds(source, target)
 
 
 def _normal(cloud: PointCloud) -> Array | None:
-    # Unit normal (3,) of the plane that holds all points and the sensor, its largest part positive; None without one.
-    place = cloud.viewpoint
-    if place is None or place.ndim > 1:
-        return None
-    rays = cloud.points - place
+    # Unit normal (3,) of the plane that holds the points and their sensors, its largest part positive; None without
+    # one. Of a map that no sensor saw, the plane of the points.
     extent = reach(cloud.radii)
     if extent <= 0.0:
         return None
+    rays = cloud.points - (_places(cloud) if len(cloud.seen.places) else cloud.points.mean(axis=0))
     normal: Array = np.linalg.eigh(rays.T @ rays)[1][:, 0]
     normal = normal * np.sign(normal[np.argmax(np.abs(normal))])
-    return normal if float(np.abs(rays @ normal).max()) < _THIN * extent else None
+    off = np.abs(rays @ normal)
+    return normal if float(np.quantile(off, _NEARLY_ALL)) < _THIN * extent else None
+
+
+def _places(cloud: PointCloud) -> Array:
+    # Where each point was seen from, (N, 3) or (1, 3).
+    places, of_point, _ = cloud.seen
+    return places if of_point is None else places[of_point]
 
 
 def _raised(cloud: PointCloud, up: Array, height: float, step: float, rng: np.random.Generator) -> PointCloud:
     # The cloud's own points first: what the caller says of its rows stays true.
-    place = cloud.seen.places[0]
     levels = np.arange(-height, height + 0.5 * step, step)
-    walls = (cloud.points[None] + levels[:, None, None] * up).reshape(-1, 3)
-    beams = sample(cloud.points, _BEAMS) - place
+    rows = np.tile(np.arange(len(cloud)), 1 + len(levels))
+    lift = np.concatenate([np.zeros(len(cloud)), np.repeat(levels, len(cloud))])
+    floor, below = _under_beams(cloud, step) if len(cloud.seen.places) else _beside(cloud, up, step, rng)
+    rows, lift = (
+        np.concatenate([rows, below]),
+        np.concatenate([lift, -height + _UNEVEN * step * rng.uniform(-1.0, 1.0, len(below))]),
+    )
+    points = np.concatenate([cloud.points[rows[: -len(below) or None]], floor]) + lift[:, None] * up
+    points.setflags(write=False)
+    places, of_point, words = cloud.seen
+    said = Seen(places, None if of_point is None else of_point[rows], words)
+    return replace(cloud, points=points, said=said, kept=None if cloud.kept is None else {})
+
+
+def _under_beams(cloud: PointCloud, step: float) -> tuple[Array, NDArray[np.int64]]:
+    # At every step along each beam, up to where it ended; and the row of its point.
+    some = np.sort(np.random.default_rng(0).permutation(len(cloud))[:_BEAMS])
+    places = np.broadcast_to(_places(cloud), cloud.points.shape)[some]
+    beams = cloud.points[some] - places
     length = np.linalg.norm(beams, axis=1)
-    n = np.maximum((length / step).astype(np.int64), 0)
-    # At every step along each beam, up to where it ended.
+    n = (length / step).astype(np.int64)
     beam = np.repeat(np.arange(len(beams)), n)
     along = step * (1 + np.arange(len(beam)) - np.repeat(np.cumsum(n) - n, n))
-    under = height + _UNEVEN * step * rng.uniform(-1.0, 1.0, len(beam))
-    floor = place + beams[beam] * (along / length[beam])[:, None] - under[:, None] * up
-    points = np.concatenate([cloud.points, walls, floor])
-    points.setflags(write=False)
-    said = Seen(cloud.seen.places, None, cloud.seen.words)
-    return replace(cloud, points=points, said=said, kept=None if cloud.kept is None else {})
+    return places[beam] + beams[beam] * (along / length[beam])[:, None], some[beam]
+
+
+def _beside(
+    cloud: PointCloud, up: Array, step: float, rng: np.random.Generator
+) -> tuple[Array, NDArray[np.int64]]:
+    # At random to either side of each point: one of the two was in some sensor's view.
+    rows = np.repeat(np.arange(len(cloud)), _BESIDE)
+    aside = _ASIDE * step * rng.uniform(-1.0, 1.0, (len(rows), 3))
+    return cloud.points[rows] + aside - (aside @ up)[:, None] * up, rows
