@@ -49,7 +49,7 @@ def raised(pair: Pair) -> Pair:
         for k, (cloud, up) in enumerate(zip(clouds, ups, strict=True))
         if up is not None
     )
-    return pair.with_clouds(source, target)
+    return pair.replaced(source=source, target=target, drawn=True)
 
 
 def _normal(cloud: PointCloud) -> Array | None:

@@ -52,6 +52,8 @@ class Pair:
         Where the clouds were put before the search (`hybridreg.prior`); results are told in the user's coordinates.
     bounds : PoseBounds or None
         Which poses are possible at all.
+    drawn : bool
+        Walls and floor were drawn into both flat scans (`hybridreg.flat_scans`).
     """
 
     source: PointCloud
@@ -62,6 +64,7 @@ class Pair:
     gravity: Gravity = "known"
     placed: Placement | None = None
     bounds: PoseBounds | None = None
+    drawn: bool = False
 
     def allows(self, T: Array) -> bool:
         """Whether a pose (4, 4) between the clouds' frames lies within the bounds, where there are some."""

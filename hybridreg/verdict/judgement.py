@@ -31,6 +31,11 @@ Array = NDArray[np.float64]
 _LEAST_MARGIN = 0.05
 
 
+# Share of the walls drawn through flat scans that may be seen through: of 59 right poses on training pairs none has
+# more than 0.03, of the wrong ones that are likely otherwise none less than 0.05.
+_THROUGH_WALLS = 0.04
+
+
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Weighed:
     """What both clouds say about a pose and its rivals.
@@ -134,7 +139,10 @@ def weigh(scene: Scene, pose: Pose) -> Weighed:
     own, *found = told_apart([own, *(one for one in offered if scene.pair.allows(one.T))])
     found = best(found)
     evidence = evidence_of(own, found, at.size if pose.found else Size())
-    return Weighed(at=at, rivals=found, evidence=evidence, confidence=confidence(evidence))
+    probability = confidence(evidence)
+    if scene.pair.drawn and evidence.looked_through_rare > _THROUGH_WALLS:
+        probability = min(probability, DOUBTED)
+    return Weighed(at=at, rivals=found, evidence=evidence, confidence=probability)
 
 
 def evidence_of(own: Hypothesis, found: list[Hypothesis], size: Size) -> Evidence:
