@@ -17,6 +17,7 @@ import statistics
 import subprocess
 import sys
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import NamedTuple
@@ -90,18 +91,14 @@ def pairs(data: Sequence[str], seeds: Sequence[int], kinds: Sequence[str], yaws:
     """Pairs of data sets, each `yaws` times with its source turned about z, or as it is for 0; and hard kinds."""
     for name in data:
         for k, one in enumerate(open_dataset(name)):
-            source, target = (cloud.points + cloud.offset for cloud in (one.pair.source, one.pair.target))
+            given = Sample.of(one, name, hopeless="disjoint" in name)
             for yaw in np.random.default_rng(k).uniform(0.0, 360.0, yaws) if yaws else [0.0]:
                 T = se3.yaw(float(yaw))
-                truths = () if "disjoint" in name else (one.T_target_source @ se3.inverse(T),)
-                yield Sample(
-                    kind=name,
-                    name=f"{one.pair.id} {yaw:.0f}",
-                    source=se3.apply(T, source),
-                    target=target,
-                    truths=truths,
-                    metres=0.5,
-                    solvable=bool(truths),
+                yield replace(
+                    given,
+                    name=f"{given.name} {yaw:.0f}",
+                    source=se3.apply(T, given.source),
+                    truths=tuple(truth @ se3.inverse(T) for truth in given.truths),
                 )
     yield from (hard.sample(kind, seed) for seed in seeds for kind in kinds)
 
@@ -140,6 +137,8 @@ def main() -> None:
     )
     parser.add_argument("--preset", default="default")
     options = parser.parse_args()
+    if not options.data and not options.hard:
+        parser.error("nothing to measure: give --data or --hard")
     seeds = [int(seed) for seed in options.hard.split(",") if seed]
     builds = {
         name: Build(checkout, options.preset)
@@ -150,8 +149,8 @@ def main() -> None:
         for k, one in enumerate(pairs(options.data, seeds, options.kinds, options.yaws)):
             file = Path(folder) / f"{k}.npz"
             np.savez(file, source=one.source, target=one.target)
-            if not rows:  # imports and weights are not measured
-                [build.register(file) for build in builds.values()]
+            for build in () if rows else builds.values():  # imports and weights are not measured
+                build.register(file)
             answers = {name: build.register(file) for name, build in builds.items()}
             file.unlink()
             rows.append((one, answers))

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from hybridreg.geometry.nearest_descriptors import nearest
 from hybridreg.matches import Correspondences, Overlap
 from hybridreg.runtime.open3d import load_open3d
-from hybridreg.scene import Scene, Side
+from hybridreg.scene import SIDES, Scene, Side
 from hybridreg.stage import Stage
 
 Array = NDArray[np.float64]
@@ -82,11 +82,10 @@ class Fpfh(Stage):
                 raise ValueError(f"{name}={getattr(self, name)} must be at least 3")
 
     def __call__(self, scene: Scene, overlap: Overlap) -> Correspondences:
-        sides: tuple[Side, Side] = ("source", "target")
-        features = [self.features(scene, side) for side in sides]
+        features = [self.features(scene, side) for side in SIDES]
         rows = [
             self._rows(scene, side, f, probability)
-            for side, f, probability in zip(sides, features, (overlap.source, overlap.target), strict=True)
+            for side, f, probability in zip(SIDES, features, (overlap.source, overlap.target), strict=True)
         ]
         if min(len(r) for r in rows) == 0:
             return Correspondences.none()

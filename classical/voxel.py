@@ -54,16 +54,16 @@ class VoxelGrid(Stage):
             raise ValueError(f"density={self.density!r} must be 'keep' or 'match'")
 
     def __call__(self, pair: Pair) -> Scene:
-        given = raised(pair)
-        flat, pair = given is not pair, thinned(given, self.voxel)
-        scene = self._scene(pair)
-        if flat:
+        thin = thinned(pair, self.voxel)
+        drawn = raised(thin)
+        scene = self._scene(thinned(drawn, self.voxel))
+        if drawn is not thin:
             scene.note(
                 "both clouds are flat 2-D scans: walls were drawn through their points, a floor under their beams"
             )
         for name, cloud, all_of_it in (
-            ("source", pair.source, given.source),
-            ("target", pair.target, given.target),
+            ("source", thin.source, pair.source),
+            ("target", thin.target, pair.target),
         ):
             if len(cloud) < len(all_of_it):
                 scene.note(f"the {name}'s {len(all_of_it)} points were first thinned to {len(cloud)}")

@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 
 from hybridreg.cloud import PointCloud
 from hybridreg.geometry.extent import reach
-from hybridreg.geometry.viewpoint import Seen
 from hybridreg.pair import Pair
 from hybridreg.resolution import default_voxel
 
@@ -38,18 +37,17 @@ _UNEVEN = 0.1
 
 def raised(pair: Pair) -> Pair:
     """The pair, both of its clouds with walls and floor where both are flat scans; as it is otherwise."""
-    clouds = (pair.source, pair.target)
-    ups = [_normal(cloud) for cloud in clouds]
-    if ups[0] is None or ups[1] is None:
+    source_up = _normal(pair.source)
+    target_up = None if source_up is None else _normal(pair.target)
+    if source_up is None or target_up is None:
         return pair
-    height = _HEIGHT * min(reach(cloud.radii) for cloud in clouds)
-    step = default_voxel(*clouds)
-    source, target = (
-        _raised(cloud, up, height, step, np.random.default_rng(k))
-        for k, (cloud, up) in enumerate(zip(clouds, ups, strict=True))
-        if up is not None
+    height = _HEIGHT * min(reach(cloud.radii) for cloud in (pair.source, pair.target))
+    step = default_voxel(pair.source, pair.target)
+    return pair.replaced(
+        source=_raised(pair.source, source_up, height, step, np.random.default_rng(0)),
+        target=_raised(pair.target, target_up, height, step, np.random.default_rng(1)),
+        drawn=True,
     )
-    return pair.replaced(source=source, target=target, drawn=True)
 
 
 def _normal(cloud: PointCloud) -> Array | None:
@@ -72,20 +70,18 @@ def _places(cloud: PointCloud) -> Array:
 
 
 def _raised(cloud: PointCloud, up: Array, height: float, step: float, rng: np.random.Generator) -> PointCloud:
-    # The cloud's own points first: what the caller says of its rows stays true.
     levels = np.arange(-height, height + 0.5 * step, step)
-    rows = np.tile(np.arange(len(cloud)), 1 + len(levels))
-    lift = np.concatenate([np.zeros(len(cloud)), np.repeat(levels, len(cloud))])
-    floor, below = _under_beams(cloud, step) if len(cloud.seen.places) else _beside(cloud, up, step, rng)
-    rows, lift = (
-        np.concatenate([rows, below]),
-        np.concatenate([lift, -height + _UNEVEN * step * rng.uniform(-1.0, 1.0, len(below))]),
-    )
-    points = np.concatenate([cloud.points[rows[: -len(below) or None]], floor]) + lift[:, None] * up
+    walls = (cloud.points + levels[:, None, None] * up).reshape(-1, 3)
+    beneath, below = _under_beams(cloud, step) if len(cloud.seen.places) else _beside(cloud, up, step, rng)
+    lift = _UNEVEN * step * rng.uniform(-1.0, 1.0, len(below)) - height
+    # The cloud's own points first: what the caller says of its rows stays true.
+    points = np.concatenate([cloud.points, walls, beneath + lift[:, None] * up])
     points.setflags(write=False)
-    places, of_point, words = cloud.seen
-    said = Seen(places, None if of_point is None else of_point[rows], words)
-    return replace(cloud, points=points, said=said, kept=None if cloud.kept is None else {})
+    seen = cloud.seen
+    if seen.of_point is not None:
+        rows = np.concatenate([np.tile(np.arange(len(cloud)), 1 + len(levels)), below])
+        seen = seen._replace(of_point=seen.of_point[rows])
+    return replace(cloud, points=points, said=seen, kept=None if cloud.kept is None else {})
 
 
 def _under_beams(cloud: PointCloud, step: float) -> tuple[Array, NDArray[np.int64]]:

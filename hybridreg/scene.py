@@ -25,6 +25,7 @@ from hybridreg.thinning import thinned
 
 Array = NDArray[np.float64]
 Side = Literal["source", "target"]
+SIDES: tuple[Side, Side] = ("source", "target")
 Value = TypeVar("Value")
 
 

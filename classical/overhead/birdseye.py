@@ -18,7 +18,7 @@ from hybridreg.geometry import se3
 from hybridreg.geometry.ground import Ground
 from hybridreg.matches import Correspondences, Pose
 from hybridreg.resolution import map_cell
-from hybridreg.scene import Level, Scene, Side
+from hybridreg.scene import SIDES, Level, Scene, Side
 from hybridreg.search.hypothesis import Found, Hypothesis, as_pose
 from hybridreg.search.ranking import BEYOND_DOUBT, best, distinct
 from hybridreg.search.settle import best_first
@@ -121,7 +121,7 @@ class BirdsEye(Stage):
     def _laid(self, scene: Scene, own: Scene, frames: Sequence[Array], voxel: float) -> list[Hypothesis]:
         # The best poses with each cloud levelled by one frame (T_level_source, T_level_target).
         T_level_source, T_level_target = frames
-        source, target = (self._view(own, s, T, voxel) for s, T in zip(_SIDES, frames, strict=True))
+        source, target = (self._view(own, s, T, voxel) for s, T in zip(SIDES, frames, strict=True))
         if len(source.filled.layer) == 0 or len(target.filled.layer) == 0:
             return []
         found = self._searched(scene, source, target, voxel, frames)
@@ -188,9 +188,6 @@ class BirdsEye(Stage):
         return peaks.matrices
 
 
-_SIDES: tuple[Side, Side] = ("source", "target")
-
-
 def _unlevelled(motions: Sequence[Array], frames: Sequence[Array]) -> list[Array]:
     # Motions along the ground as T_target_source.
     T_level_source, T_level_target = frames
@@ -206,9 +203,9 @@ def _centred(T_level_cloud: Array, place: Array) -> Array:
 
 def _by_ground(own: Scene, scene: Scene) -> list[Array]:
     # What levels each cloud by the ground it shows, or by what may be the ground instead.
-    found = {side: own.level(side).ground for side in _SIDES}
+    found = {side: own.level(side).ground for side in SIDES}
     frames = []
-    for side, other in zip(_SIDES, reversed(_SIDES), strict=True):
+    for side, other in zip(SIDES, reversed(SIDES), strict=True):
         shown, known = found[side], found[other]
         level = own.level(side)
         if shown is None:

@@ -47,26 +47,26 @@ def search(source: Relief, target: Relief, farthest: float, most: int) -> list[A
     far_s, far_t = (np.hypot(*x.T) for x in (xs, xt))
     near_s, near_t = far_s <= far_t.max() + farthest, far_t <= far_s.max() + farthest
     (xs, hs), (xt, ht) = (xs[near_s], hs[near_s]), (xt[near_t], ht[near_t])
-    reaches = far_s.max(where=near_s, initial=0.0), far_t.max(where=near_t, initial=0.0)
-    n = fft.next_fast_len(int(np.ceil((sum(reaches) + min(farthest, sum(reaches))) / cell)) + 3, real=True)
+    across = far_s.max(where=near_s, initial=0.0) + far_t.max(where=near_t, initial=0.0)
+    n = fft.next_fast_len(int(np.ceil((across + min(farthest, across)) / cell)) + 3, real=True)
     place = cell * np.fft.fftfreq(n, 1.0 / n)
     height, square, known = fft.rfft2(_maps(xt, ht, n, cell), workers=n_threads())
     best = BestYaws(place, farthest)
-    yaws = np.radians(np.arange(0.0, 180.0, _YAW_STEP_DEG))
+    yaws = np.arange(0.0, 180.0, _YAW_STEP_DEG)
     for batch in np.array_split(yaws, -(-len(yaws) // _BATCH)):
         turned = fft.rfft2(
-            np.stack([_maps(xs @ se3.yaw(yaw)[:2, :2].T, hs, n, cell) for yaw in np.degrees(batch)]),
+            np.stack([_maps(xs @ se3.yaw(yaw)[:2, :2].T, hs, n, cell) for yaw in batch]),
             workers=n_threads(),
         )
         # The half turn beyond each yaw has the conjugate spectra.
         h, q, k = np.moveaxis(np.concatenate([np.conj(turned), turned]), 1, 0)
         products = np.stack([h * height, q * known, k * square, k * known])
-        across, own, other, cells = best.near(fft.irfft2(products, s=(n, n), workers=n_threads()))
+        shared, own, other, cells = best.near(fft.irfft2(products, s=(n, n), workers=n_threads()))
         loud = np.sqrt(np.maximum(own * other, np.finfo(np.float32).tiny))
-        speaks = (cells > _FEWEST - 0.5) & (across > 0.0)
-        told = np.where(speaks, nats(cells, across / loud), -np.inf).astype(np.float32)
-        for yaw, score in zip(np.concatenate([batch, batch + np.pi]), told, strict=True):
-            best.keep(float(yaw), score)
+        speaks = (cells > _FEWEST - 0.5) & (shared > 0.0)
+        told = np.where(speaks, nats(cells, shared / loud), -np.inf).astype(np.float32)
+        for yaw, score in zip(np.concatenate([batch, batch + 180.0]), told, strict=True):
+            best.keep(float(np.radians(yaw)), score)
     return best.peaks(most, share=0.0).matrices
 
 

@@ -19,7 +19,7 @@ from hybridreg.geometry.main_axes import balanced
 from hybridreg.geometry.range_image import RangeImage, RangeImages
 from hybridreg.resolution import default_voxel, map_cell
 from hybridreg.runtime.side_by_side import side_by_side
-from hybridreg.scene import Scene, Side
+from hybridreg.scene import SIDES, Scene, Side
 
 Array = NDArray[np.float64]
 
@@ -30,7 +30,6 @@ _NEAR_ENOUGH = 1.5
 _MOST_POINTS = 20_000
 # Points that are sampled evenly for comparison: a share of 3,000 is good to one percent.
 _N_ASKED = 3_000
-_SIDES: tuple[Side, Side] = ("source", "target")
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -113,7 +112,7 @@ def _both(scene: Scene) -> Views:
         cloud: PointCloud = getattr(scene.pair, side)
         return cloud.once(key, partial(_view, scene, side, spacing, on_grid))
 
-    source, target = side_by_side(view, *_SIDES)  # most of it is sorting and trees
+    source, target = side_by_side(view, *SIDES)  # most of it is sorting and trees
     return Views(scene=scene, source=source, target=target, spacing=spacing)
 
 

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -14,6 +13,7 @@ from scipy.spatial import cKDTree
 from hybridreg.geometry import se3
 from hybridreg.geometry.extent import bounds
 from hybridreg.runtime.cores import n_threads
+from hybridreg.runtime.side_by_side import side_by_side
 
 Array = NDArray[np.float64]
 
@@ -53,12 +53,11 @@ class Overlay:
 
     @cached_property
     def _both_ways(self) -> tuple[Fitness, Fitness]:
-        # In parallel, as a tree is built by one thread.
-        with ThreadPoolExecutor(min(2, n_threads())) as pool:
-            T = self.T_target_source
-            forth = pool.submit(measure, self.source, self.target, T, self.max_distance)
-            back = pool.submit(measure, self.target, self.source, se3.inverse(T), self.max_distance)
-            return forth.result(), back.result()
+        T = self.T_target_source
+        ways = (self.source, self.target, T), (self.target, self.source, se3.inverse(T))
+        # As a tree is built by one thread.
+        forth, back = side_by_side(lambda way: measure(*way, self.max_distance), *ways)
+        return forth, back
 
     @property
     def of_source(self) -> Fitness:

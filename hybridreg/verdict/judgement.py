@@ -30,7 +30,6 @@ Array = NDArray[np.float64]
 # Nats per point by which a size must be better than those 1.5 % beside it: by hand; 0.09 to 2 on four pairs.
 _LEAST_MARGIN = 0.05
 
-
 # Share of the walls drawn through flat scans that may be seen through: of 59 right poses on training pairs none has
 # more than 0.03, of the wrong ones that are likely otherwise none less than 0.05.
 _THROUGH_WALLS = 0.04
@@ -107,6 +106,7 @@ def judge(scene: Scene, pose: Pose, matches: Correspondences) -> Judgement:
         unseen=_unseen(scene),
         explained=bool(scene.explanations),
         started=scene.pair.placed is not None,
+        through_walls=_through_walls(scene, evidence),
     )
     return Judgement(
         verdict=word(probability),
@@ -140,9 +140,13 @@ def weigh(scene: Scene, pose: Pose) -> Weighed:
     found = best(found)
     evidence = evidence_of(own, found, at.size if pose.found else Size())
     probability = confidence(evidence)
-    if scene.pair.drawn and evidence.looked_through_rare > _THROUGH_WALLS:
+    if _through_walls(scene, evidence):
         probability = min(probability, DOUBTED)
     return Weighed(at=at, rivals=found, evidence=evidence, confidence=probability)
+
+
+def _through_walls(scene: Scene, evidence: Evidence) -> bool:
+    return scene.pair.drawn and evidence.looked_through_rare > _THROUGH_WALLS
 
 
 def evidence_of(own: Hypothesis, found: list[Hypothesis], size: Size) -> Evidence:

@@ -35,21 +35,25 @@ def reasons(
     unseen: Mapping[str, str],
     explained: bool = False,
     started: bool = False,
+    through_walls: bool = False,
 ) -> tuple[str, ...]:
     """Why the verdict is what it is; never empty. `unseen` says why the viewpoint of a cloud is unknown.
 
-    `explained`: a sentence before these says why no pose was found; `started`: the search began at a given start.
+    `explained`: a sentence before these says why no pose was found; `started`: the search began at a given start;
+    `through_walls`: more of the walls of flat scans is seen through than at any right pose.
     """
     if not found:
         instead = "the start" if started else "the identity"
         if explained:
             return (f"no pose is left: {instead} was returned",)
         return (f"no pose was found: the estimator had nothing to work with, and returned {instead}",)
-    against = (*_against(evidence, agreement, held), *_unknown(unseen))
+    against = (*_against(evidence, agreement, held, through_walls), *_unknown(unseen))
     return (*against, _in_favour(evidence)) if against else (_in_favour(evidence),)
 
 
-def _against(evidence: Evidence, agreement: Agreement, held: Information) -> Iterator[str]:
+def _against(
+    evidence: Evidence, agreement: Agreement, held: Information, through_walls: bool
+) -> Iterator[str]:
     if evidence.overturned:
         yield (
             "the pose turns the world upside down, or puts a sensor below the other cloud's ground; if a cloud may be "
@@ -67,6 +71,8 @@ def _against(evidence: Evidence, agreement: Agreement, held: Information) -> Ite
             f"({evidence.looked_through_source:.0%} of the source's, "
             f"{evidence.looked_through_target:.0%} of the target's)"
         )
+    elif through_walls:
+        yield f"free space is violated: the scanners saw through {evidence.looked_through_rare:.0%} of the walls"
     k = int(np.argmin(agreement.shares))
     if agreement.shares[k] < AGREEMENT:
         yield _about_axis(agreement, k)

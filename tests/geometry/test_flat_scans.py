@@ -37,6 +37,14 @@ def test_scans_of_different_rooms_are_not_ok(here: int, there: int) -> None:
     assert hr.register(sample("flat", here).source, sample("flat", there).target).verdict != "ok"
 
 
+def test_walls_that_are_seen_through_are_told() -> None:
+    result = hr.register(sample("flat", 534).source, sample("flat", 536).target)
+
+    assert result.verdict == "doubtful"
+    assert "saw through" in result.reasons[0]
+    assert "of the walls" in result.reasons[0]
+
+
 @pytest.mark.parametrize("seen", ["nowhere", "two places"])
 def test_a_flat_map_is_raised_too(seen: str) -> None:
     one = sample("flat", SEEDS[1])

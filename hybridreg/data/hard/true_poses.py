@@ -10,10 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybridreg.geometry import se3
+from hybridreg.pair import LabelledPair
 
 Array = NDArray[np.float64]
 # Degrees within which a pose is right.
 DEGREES = 2.0
+# Metres within which one of vehicles' sensors is.
+_METRES = 0.5
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -32,6 +35,20 @@ class Sample:
     solvable: bool
     # The mistake that the input contains: "mirror", "scale 0.95" (multiply the source), "mm", "cm" or "ft".
     cure: str = ""
+
+    @classmethod
+    def of(cls, labelled: LabelledPair, kind: str, *, hopeless: bool) -> Sample:
+        """A data set's pair, right within half a metre; no pose is where its clouds show different places."""
+        pair = labelled.pair
+        return cls(
+            kind=kind,
+            name=pair.id,
+            source=pair.source.points + pair.source.offset,
+            target=pair.target.points + pair.target.offset,
+            truths=() if hopeless else (labelled.T_target_source,),
+            metres=_METRES,
+            solvable=not hopeless,
+        )
 
 
 Maker = Callable[[np.random.Generator, int], Sample]

@@ -35,8 +35,6 @@ TIERS = ("near", "mid", "far", "degenerate", "disjoint")
 GROUPS = (*TIERS, "hard", "real")
 # Hard pairs for each pair of a tier, and the first of their even seeds: below it they took part in fits.
 _HARD, _FIRST_SEED = 2, 300
-# Metres within which a pose of simulated and real pairs is right.
-_RIGHT_METRES = 0.5
 
 _settle = settle.settle
 # The entries of `default` by what else a user would call them: left out one at a time.
@@ -97,14 +95,7 @@ def case(job: Job) -> Case:
 
 
 def _labelled(group: str, labelled: LabelledPair) -> Case:
-    pair = labelled.pair
-    source, target = (cloud.points + cloud.offset for cloud in (pair.source, pair.target))
-    truths = () if group == "disjoint" else (labelled.T_target_source,)
-    sample = Sample(
-        kind=group, name=pair.id, source=source, target=target, truths=truths, metres=_RIGHT_METRES,
-        solvable=bool(truths),
-    )  # fmt: skip
-    return Case(group, pair, sample)
+    return Case(group, labelled.pair, Sample.of(labelled, group, hopeless=group == "disjoint"))
 
 
 def measure(case: Case, without: str) -> Row:
