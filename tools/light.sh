@@ -5,6 +5,8 @@ set -euo pipefail
 folder=${1:?a folder for the environment}
 most_mb=350
 most_seconds=60
+# With a checkout on it, pip would take the wheel for installed already.
+unset PYTHONPATH
 
 rm -rf build/lib "$folder" && mkdir -p "$folder"
 "${PYTHON:-python3}" -m venv "$folder/env"
