@@ -64,7 +64,7 @@ def _reached(scene: Scene, side: Side, baseline: float) -> Array:
     if not isinstance(image, RangeImage) or level.viewpoint is None or level.viewpoint.ndim > 1:
         return np.ones(len(level))
     farthest = float(np.quantile(image.ranges, 1.0 - _STRAYS))
-    here, there = scene.level(side).ground, scene.level(other).ground
+    here, there = scene.grounds[side], scene.grounds[other]
     if here is None or there is None:
         return _within_range(level.points - level.viewpoint, farthest, baseline)
     up = here.above(level.points) - float(there.above(image.viewpoint[None])[0])

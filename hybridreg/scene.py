@@ -71,6 +71,12 @@ class Level:
         return ground.under(self.points, self.viewpoint, self.spacing)
 
     @cached_property
+    def facing_ground(self) -> Ground | None:
+        """The ceiling over its floor, or the floor under what was taken for the ground (`ground.facing`)."""
+        found = self.ground
+        return None if found is None else ground.facing(self.points, self.normals(), found, self.spacing)
+
+    @cached_property
     def centre(self) -> Array:
         """Where the cloud was seen from, (3,): the middle of several places; of the points where none is known."""
         return seen_from.centre(self.points, self.viewpoint)
@@ -135,6 +141,23 @@ class Scene:
     def level(self, side: Side) -> Level:
         """The source's level or the target's."""
         return self.source if side == "source" else self.target
+
+    @cached_property
+    def grounds(self) -> dict[Side, Ground | None]:
+        """The ground of each cloud: two floors, or two ceilings.
+
+        Indoors a sensor may see more of the ceiling than of the floor. Sensors and maps are more often upright than
+        upside down, so where one ground lies over its sensor and the other does not, one cloud shows its other side.
+        """
+        found = {side: self.level(side).ground for side in SIDES}
+        upright = {side: one is not None and one.up[2] > 0.0 for side, one in found.items()}
+        if None in found.values() or len(set(upright.values())) == 1 or self.pair.gravity != "known":
+            return found
+        for side in sorted(SIDES, key=upright.__getitem__):
+            other = self.level(side).facing_ground
+            if other is not None:
+                return {**found, side: other}
+        return found
 
     @property
     def spacing(self) -> float:

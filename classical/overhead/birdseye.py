@@ -114,7 +114,12 @@ class BirdsEye(Stage):
 
     def _levelled(self, own: Scene, scene: Scene) -> Iterator[Sequence[Array]]:
         if self.vertical != "sensor":
-            yield _by_ground(own, scene)
+            as_shown = {side: own.level(side).ground for side in SIDES}
+            yield _by_ground(own, scene, own.grounds)
+            if any(
+                own.grounds[side] is not as_shown[side] for side in SIDES
+            ):  # one of the sensors may hang from the ceiling
+                yield _by_ground(own, scene, as_shown)
         if self.vertical == "sensor" or (self.vertical == "both" and _leans(own)):
             yield _by_sensor(own)
 
@@ -201,9 +206,8 @@ def _centred(T_level_cloud: Array, place: Array) -> Array:
     return se3.from_rt(R, t - (R @ place + t) * [1.0, 1.0, 0.0])
 
 
-def _by_ground(own: Scene, scene: Scene) -> list[Array]:
-    # What levels each cloud by the ground it shows, or by what may be the ground instead.
-    found = {side: own.level(side).ground for side in SIDES}
+def _by_ground(own: Scene, scene: Scene, found: dict[Side, Ground | None]) -> list[Array]:
+    # What levels each cloud by the ground found for it, or by what may be the ground instead.
     frames = []
     for side, other in zip(SIDES, reversed(SIDES), strict=True):
         shown, known = found[side], found[other]

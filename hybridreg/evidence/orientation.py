@@ -44,6 +44,8 @@ def _under(a: View, b: View, T_b_a: Array) -> bool:
         return a.image is not None and float(b.ground.above(place[None])[0]) < -slack
     if cosine > _APART:
         return False
+    if a.ground.upright and b.ground.upright:
+        return True
     # The foot of one sensor on its own ground, turned over, against the other ground: a ceiling taken for a ground lies
     # a storey away.
     foot = place - float(a.ground.above(a.centre[None])[0]) * T_b_a[:3, :3] @ a.ground.up

@@ -108,7 +108,8 @@ def _both(scene: Scene) -> Views:
     on_grid = scene.at(map_cell(scene.pair.source, scene.pair.target))
 
     def view(side: Side) -> View:
-        key = ("view", spacing, scene.level(side).spacing, on_grid.spacing, scene.pair.gravity)
+        turned = on_grid.grounds[side] is not on_grid.level(side).ground
+        key = ("view", spacing, scene.level(side).spacing, on_grid.spacing, scene.pair.gravity, turned)
         cloud: PointCloud = getattr(scene.pair, side)
         return cloud.once(key, partial(_view, scene, side, spacing, on_grid))
 
@@ -141,16 +142,20 @@ def _view(scene: Scene, side: Side, wanted: float, on_grid: Scene) -> View:
 
 
 def _upright_ground(on_grid: Scene, side: Side) -> Ground | None:
-    # Its upper side is that of the sensor; where nobody said where that stood, of what stands on it too.
-    found, level = on_grid.level(side).ground, on_grid.level(side)
+    # Its upper side is that of the sensor; where nobody said where that stood, of what stands on it too. Not in a room,
+    # where what reaches from the floor to the ceiling stands on both.
+    found, level = on_grid.grounds[side], on_grid.level(side)
     if found is None or level.viewpoint is None or getattr(on_grid.pair, side).said is not None:
+        return found
+    facing = level.facing_ground
+    if facing is not None and float(facing.above(level.centre[None])[0]) > 0.0:
         return found
     by_content = ground.under(level.points, None, level.spacing)
     return found if by_content is not None and float(by_content.up @ found.up) > 0.5 else None
 
 
 def _relief(scene: Scene, side: Side, on_grid: Scene) -> Relief | None:
-    found, level = on_grid.level(side).ground, on_grid.level(side)
+    found, level = on_grid.grounds[side], on_grid.level(side)
     if found is None:
         return None
     return Relief.of(getattr(scene.pair, side).points, level.centre, found, level.spacing)
