@@ -73,8 +73,9 @@ class Table:
         names = [
             e.name for e in self.methods if any(OWN_GRID in note for row in e.rows for note in row.notes)
         ]
+        whose = "all methods" if 1 < len(names) == len(self.methods) else "; ".join(names)
         told = "What the downsample slot chose did not reach the networks of"
-        return [f"{told} {'; '.join(names)}: each {OWN_GRID}"] if names else []
+        return [f"{told} {whose}: each {OWN_GRID}"] if names else []
 
     @property
     def methods(self) -> list[Entry]:

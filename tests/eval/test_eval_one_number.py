@@ -131,6 +131,12 @@ def test_a_downsampling_that_does_not_reach_the_matcher_stands_in_the_table() ->
         "What the downsample slot chose did not reach the networks of learned, finely: each put the clouds on a "
         "grid of its own"
     ]
+    both = [Entry(name=name, rows=rows) for name in ("learned, finely", "learned, coarsely")]
+    told = Table(title="t", data="d", seed=0, starts=0, entries=both).remarks()
+    assert told == [
+        "What the downsample slot chose did not reach the networks of all methods: each put the clouds on a grid of "
+        "its own"
+    ]
 
 
 def test_doctor_claims_no_package_that_nothing_imports() -> None:
