@@ -14,11 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybridreg.cloud import PointCloud
+from hybridreg.evidence.covariance import of_information
 from hybridreg.geometry import se3
 from hybridreg.geometry.fitness import Overlay
 from hybridreg.matches import Correspondences, EntryTrace
 from hybridreg.output import picture, result_words
-from hybridreg.output.covariance import of_information
 from hybridreg.output.pose_text import pose_text
 from hybridreg.resolution import VEHICLES, Tolerance
 
@@ -135,9 +135,9 @@ class RegistrationResult:
     @cached_property
     def covariance(self) -> Array:
         """Covariance (6, 6) of a right pose's error: turns about `centre` (radians) before translations (metres), along
-        the target's axes; infinite where the surfaces leave a direction open. See `hybridreg.output.covariance` for
+        the target's axes; infinite where the surfaces leave a direction open. See `hybridreg.evidence.covariance` for
         what its scale was checked against. It says nothing of a wrong pose: that is `confidence`."""
-        return of_information(self.information)
+        return of_information(self.information, self.tolerance)
 
     def apply(self, points: Any) -> Array:
         """Points of the source (N, 3), or any cloud that `PointCloud.of` takes, in the target's coordinates: (N, 3).

@@ -17,10 +17,10 @@ import hybridreg as hr
 from hybridreg import testing
 from hybridreg.cli.app import app
 from hybridreg.config.number_of import number_of
+from hybridreg.evidence.covariance import of_information
 from hybridreg.geometry import se3
 from hybridreg.io import read_points, write_points
 from hybridreg.output import pose_text
-from hybridreg.output.covariance import of_information
 
 POSES = [
     np.eye(4),

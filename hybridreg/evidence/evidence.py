@@ -47,6 +47,7 @@ class Evidence:
 
     support: float = 0.0  # log-odds that the pose is right, were there no other
     rival_margin: float = NO_RIVAL  # log-odds of the best rival less the pose's
+    compared: float = 0.0  # points that were compared, of the cloud with fewer; at most 3,000
     visible_source: float = 0.0  # share of the source's points that the target's sensor looked at
     visible_target: float = 0.0  # share of the target's points that the source's sensor looked at
     hidden_source: float = 0.0  # share of the source's points behind a surface of the target

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from hybridreg.evidence import match_agreement
 from hybridreg.evidence.pose_evidence import PoseEvidence
+from hybridreg.evidence.surface_distance import settle_closely
 from hybridreg.geometry import se3
 from hybridreg.matches import Pose
 from hybridreg.scene import Scene
@@ -24,6 +25,8 @@ _OFFERED = 4
 _SETTLED = 8
 # Rivals that are enough; by hand.
 _ENOUGH = 4
+# Log-odds below the pose's from which a rival is none to speak of: by hand.
+_CONTENDS = 6.0
 # Strides over the sampled points: for a guess's promise, and once it is settled.
 _QUICK, _CLOSE = 10, 2
 
@@ -46,7 +49,14 @@ def find(scene: Scene, own: PoseEvidence, pose: Pose) -> list[Hypothesis]:
     moved = iter(seen_at(scene, settle(views, guessed), _CLOSE))
     rivals = [one if one.settled else next(moved) for one in likeliest]
     # Guesses that come back to the pose are no rivals, and must not hide those behind them.
-    return best([with_matches(one) for one in rivals if is_rival(one.T)][:_ENOUGH])
+    apart = best([with_matches(one) for one in rivals if is_rival(one.T)][:_ENOUGH])
+
+    def came_to_rest(one: Hypothesis) -> bool:
+        # Where surfaces hold a pose loosely, a rival may have stopped on its way to it.
+        far_behind = one.log_odds < own.by_surfaces - _CONTENDS
+        return far_behind or is_rival(settle_closely(views.fine, one.T))
+
+    return [one for one in apart if came_to_rest(one)]
 
 
 def _turned(own: PoseEvidence) -> list[Array]:

@@ -26,10 +26,13 @@ Word = Literal["ok", "doubtful", "failed"]
 FAILED = 0.5
 # Probability of a pose that turns the world upside down, at most: by hand.
 _OVERTURNED = 0.3
-# Probability of a pose at which the source fits better at another scale, or the input looks mistaken, at most: by hand.
+# Probability of a pose that chance may explain, at which the source fits better at another scale, or whose input looks
+# mistaken, at most: by hand.
 DOUBTED = 0.9
 # Nats per point from which it fits better at another scale: of some 400 right training poses none gained 0.08.
 SIZE_GAIN = 0.12
+# Of sparse clouds, points that agree off the commonest surface before a pose is "ok": chance makes a handful agree.
+SPARSE, _AGREE = 1000, 20
 # Log-odds by which a rival may be likelier and still count as equal; by hand.
 _EQUAL = 1.0
 # Evidence that speaks for a pose the larger it is (+1), or against it (-1); 0 may do either.
@@ -50,6 +53,7 @@ SPEAKS = {
     "weakest": 1,
     "matched": 1,
     "found_by": 1,
+    "compared": 0,
     "visible_less": 0,
     "visible_more": 0,
     "fitness_visible_less": 1,
@@ -75,7 +79,8 @@ def confidence(evidence: Evidence, rule: Boosted | None = None) -> float:
         probability = FAILED
     if evidence.overturned:
         return min(probability, _OVERTURNED)
-    return min(probability, DOUBTED) if told["size_gain"] > SIZE_GAIN else probability
+    by_chance = evidence.compared < SPARSE and evidence.agreed_rare < _AGREE
+    return min(probability, DOUBTED) if told["size_gain"] > SIZE_GAIN or by_chance else probability
 
 
 def _one_of_two(told: Mapping[str, float], rule: Boosted) -> bool:

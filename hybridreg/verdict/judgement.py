@@ -10,13 +10,16 @@ from numpy.typing import NDArray
 
 from hybridreg.evidence import match_agreement
 from hybridreg.evidence.agreement import Agreement, OneWay
+from hybridreg.evidence.covariance import of_information
 from hybridreg.evidence.evidence import NO_RIVAL, Evidence, share
 from hybridreg.evidence.log_odds import NEARLY, log_odds
 from hybridreg.evidence.pose_evidence import PoseEvidence
 from hybridreg.evidence.scale import Size
 from hybridreg.evidence.views import View
 from hybridreg.geometry.fitness import Overlay
+from hybridreg.geometry.ground_relief import nats
 from hybridreg.matches import Correspondences, Pose
+from hybridreg.resolution import Tolerance, tolerance
 from hybridreg.scene import Scene
 from hybridreg.search import rivals
 from hybridreg.search.hypothesis import Hypothesis, of_pose
@@ -33,6 +36,10 @@ _LEAST_MARGIN = 0.05
 # Share of the walls drawn through flat scans that may be seen through: of 59 right poses on training pairs none has
 # more than 0.03, of the wrong ones that are likely otherwise none less than 0.05.
 _THROUGH_WALLS = 0.04
+# Standard deviations within which 95 % of a normal distribution lie.
+_MOST_LIKELY = 1.96
+# Nats of the relief from which it holds a pose too: by hand, as in `hybridreg.verdict.training.observability`.
+_TELLS = 30.0
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -107,6 +114,7 @@ def judge(scene: Scene, pose: Pose, matches: Correspondences) -> Judgement:
         explained=bool(scene.explanations),
         started=scene.pair.placed is not None,
         through_walls=_through_walls(scene, evidence),
+        slack=_slack(scene, weighed.at, evidence),
     )
     return Judgement(
         verdict=word(probability),
@@ -140,13 +148,32 @@ def weigh(scene: Scene, pose: Pose) -> Weighed:
     found = best(found)
     evidence = evidence_of(own, found, at.size if pose.found else Size())
     probability = confidence(evidence)
-    if _through_walls(scene, evidence):
+    if _through_walls(scene, evidence) or _slack(scene, at, evidence):
         probability = min(probability, DOUBTED)
     return Weighed(at=at, rivals=found, evidence=evidence, confidence=probability)
 
 
 def _through_walls(scene: Scene, evidence: Evidence) -> bool:
     return scene.pair.drawn and evidence.looked_through_rare > _THROUGH_WALLS
+
+
+def _slack(scene: Scene, at: PoseEvidence, evidence: Evidence) -> Tolerance | None:
+    # Degrees and metres by which a right pose may well be off, where more than the tolerance; what relief adds is left
+    # out of the covariance.
+    if nats(evidence.relief_cells, evidence.relief_correlation) > _TELLS:
+        return None
+    allowed = tolerance(scene.pair.source, scene.pair.target)
+    C = of_information(at.information.matrix, allowed)
+    turn, shift = (_MOST_LIKELY * _worst(part) for part in (C[:3, :3], C[3:, 3:]))
+    off = Tolerance(float(np.degrees(turn)), shift)
+    return off if off.degrees > allowed.degrees or off.metres > allowed.metres else None
+
+
+def _worst(covariance: Array) -> float:
+    # Standard deviation along the direction of the largest.
+    if not np.isfinite(covariance).all():
+        return np.inf
+    return float(np.sqrt(np.linalg.eigvalsh(covariance)[-1]))
 
 
 def evidence_of(own: Hypothesis, found: list[Hypothesis], size: Size) -> Evidence:
@@ -162,6 +189,7 @@ def evidence_of(own: Hypothesis, found: list[Hypothesis], size: Size) -> Evidenc
         rival_margin=found[0].log_odds - support if found else NO_RIVAL,
         normals=cosine,
         inlier_rmse=rmse,
+        compared=float(min(len(view.asked) for view in (own.at.views.source, own.at.views.target))),
         visible_source=looked,
         visible_target=looked_back,
         hidden_source=hidden,

@@ -11,7 +11,8 @@ from hybridreg.evidence.agreement import Agreement
 from hybridreg.evidence.evidence import Evidence
 from hybridreg.evidence.information import Information
 from hybridreg.evidence.log_odds import NEARLY
-from hybridreg.verdict.confidence import SIZE_GAIN
+from hybridreg.resolution import Tolerance
+from hybridreg.verdict.confidence import SIZE_GAIN, SPARSE
 
 # The bounds beyond which a number is worth a sentence; nine in ten right poses of simulated scenes stay within them.
 # Share of the visible points that violates free space.
@@ -36,18 +37,20 @@ def reasons(
     explained: bool = False,
     started: bool = False,
     through_walls: bool = False,
+    slack: Tolerance | None = None,
 ) -> tuple[str, ...]:
     """Why the verdict is what it is; never empty. `unseen` says why the viewpoint of a cloud is unknown.
 
     `explained`: a sentence before these says why no pose was found; `started`: the search began at a given start;
-    `through_walls`: more of the walls of flat scans is seen through than at any right pose.
+    `through_walls`: more of the walls of flat scans is seen through than at any right pose; `slack`: degrees and metres
+    by which a right pose may well be off, where that is more than the tolerance.
     """
     if not found:
         instead = "the start" if started else "the identity"
         if explained:
             return (f"no pose is left: {instead} was returned",)
         return (f"no pose was found: the estimator had nothing to work with, and returned {instead}",)
-    against = (*_against(evidence, agreement, held, through_walls), *_unknown(unseen))
+    against = (*_against(evidence, agreement, held, through_walls), *_inexact(slack), *_unknown(unseen))
     return (*against, _in_favour(evidence)) if against else (_in_favour(evidence),)
 
 
@@ -83,9 +86,17 @@ def _against(
         yield f"another pose explains the data nearly as well (its support is lower by {-margin:.2f}; see rivals)"
     if held.weakest < WEAK:
         yield f"the pose is poorly constrained {held.words}: {held.weakest:.1%} of the surfaces' information"
+    if evidence.compared < SPARSE:
+        yield f"few points: one of the clouds has only {evidence.compared:.0f} that can be compared"
     overlap = max(evidence.visible_source, evidence.visible_target)
     if overlap < OVERLAP:
         yield f"little overlap: neither sensor sees more than {overlap:.0%} of the other's points"
+
+
+def _inexact(slack: Tolerance | None) -> Iterator[str]:
+    if slack is not None:
+        how = f"{slack.degrees:.1f} deg or {slack.metres:.2g} m" if np.isfinite(slack).all() else "any length"
+        yield f"even where it is right, the surfaces hold the pose too loosely: it may be off by {how}"
 
 
 def _about_axis(agreement: Agreement, k: int) -> str:

@@ -38,6 +38,7 @@ EVIDENCE = {
 own = st.builds(Evidence, **EVIDENCE)
 odds = st.floats(-15.0, 15.0)
 WHOLE = EVIDENCE | {
+    "compared": st.floats(100.0, 3000.0),
     "visible_source": share,
     "visible_target": share,
     "fitness_visible_source": share,

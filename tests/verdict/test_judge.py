@@ -5,8 +5,11 @@ import numpy as np
 import pytest
 from made_places import Made, make
 
+import hybridreg as hr
 from hybridreg.classical.voxel import VoxelGrid
+from hybridreg.data import open_dataset
 from hybridreg.data.hard import box_world
+from hybridreg.eval.score import metrics
 from hybridreg.evidence import views
 from hybridreg.geometry import se3
 from hybridreg.matches import Correspondences, Pose
@@ -88,6 +91,15 @@ def test_a_rival_of_the_estimator_that_fits_better_is_believed(crossing: Made) -
     assert judgement.verdict == "failed"
     assert "explains the data better" in words(judgement)
     assert np.abs(judgement.rivals[0] - crossing.truth).max() < 0.2
+
+
+def test_a_rival_that_stopped_on_its_way_to_the_pose_is_none() -> None:
+    # 5.5 degrees off, on a field that hardly holds a turn about the vertical.
+    made = open_dataset("sim:train/degenerate#32")[31]
+    result = hr.register(made.pair.source, made.pair.target)
+    assert metrics.rre_deg(result.transformation, made.T_target_source) < 0.5
+    assert result.verdict == "ok"
+    assert len(result.rivals) == 0
 
 
 def test_no_pose_is_failed(crossing: Made) -> None:

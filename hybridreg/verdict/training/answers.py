@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: MIT
 """Answers of `default` to simulated training pairs, with their evidence: what the verdict's rules are fitted to.
 
-Every tier of `sim:train`, disjoint pairs too, the worlds of the verdict's tests (rooms, corridors, yards, woods), and
-the hard kinds of `hybridreg.data.hard` with even seeds (maps, vehicle frames, objects, crops, mirrored and scaled
-clouds). An answer is the best pose after the first recipe and after the last that `default` runs; and, as if the right
-pose had not been found, the best wrong one. The support learns from all poses that were found at last, and from the
-true one where none of them is right: which of these is it, if any? No real pair and no validation or test pair takes
-part.
+Every tier of `sim:train`, disjoint pairs too, some thinned to a few hundred points, the worlds of the verdict's tests
+(rooms, corridors, yards, woods), and the hard kinds of `hybridreg.data.hard` with even seeds (maps, vehicle frames,
+objects, crops, mirrored and scaled clouds). An answer is the best pose after the first recipe and after the last that
+`default` runs; and, as if the right pose had not been found, the best wrong one. The support learns from all poses that
+were found at last, and from the true one where none of them is right: which of these is it, if any? No real pair and no
+validation or test pair takes part.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import hybridreg as hr
+from hybridreg.cloud import PointCloud
 from hybridreg.data import hard, open_dataset
 from hybridreg.data.hard.box_world_scans import sight
 from hybridreg.eval.score import metrics
@@ -38,7 +39,9 @@ from hybridreg.verdict import weigh
 
 Array = NDArray[np.float64]
 Row = dict[str, Any]
-TIERS = ("near", "mid", "far", "degenerate", "disjoint", "worlds", "hard")
+TIERS = ("near", "mid", "far", "degenerate", "disjoint", "few", "worlds", "hard")
+# What is thinned to a few points, in turn.
+_THINNED = ("near", "mid", "disjoint")
 # Pairs of each tier before this one taught the shipped networks, which find more on them than on others.
 FIRST = 2000
 # Poses of a pair that are ranked beside one another, at most.
@@ -64,10 +67,23 @@ def labelled(tier: str, i: int) -> Labelled:
     if tier == "hard":
         one = hard.sample(hard.KINDS[i % len(hard.KINDS)], 2 * (i // len(hard.KINDS)))
         return Labelled(one.name, Pair.of(one.source, one.target, id=one.name), one.truths, one.metres)
+    if tier == "few":
+        return _few(labelled(_THINNED[i % len(_THINNED)], i), np.random.default_rng([i, 0]))
     simulated: Any = open_dataset(f"sim:train/{tier}#{FIRST + i + 1}")
     pair = simulated.load(FIRST + i)
     truths = () if tier == "disjoint" else (pair.T_target_source,)
     return Labelled(pair.pair.id, pair.pair, truths, 0.5)
+
+
+def _few(one: Labelled, rng: np.random.Generator) -> Labelled:
+    # 150 to 1,000 points of the source, and often of the target too, drawn at random.
+    def some(cloud: PointCloud) -> Array:
+        n = int(np.exp(rng.uniform(np.log(150), np.log(1000))))
+        return cloud.points[np.sort(rng.permutation(len(cloud.points))[:n])]
+
+    source, target = one.pair.source, one.pair.target
+    clouds = some(source), some(target) if rng.random() < 0.6 else target.points
+    return one._replace(name=f"few-{one.name}", pair=Pair.of(*clouds, id=f"few-{one.name}"))
 
 
 def answers(scene: Scene, truths: Sequence[Array], metres: float) -> Iterator[Row]:
@@ -144,13 +160,13 @@ def _rows(job: tuple[str, int]) -> list[Row]:
 
 
 def gather(path: Path, n_pairs: int, workers: int) -> None:
-    """Append the rows of pairs that the file does not hold: `n_pairs` of each tier, six times as many hard ones."""
+    """Append the rows of pairs that the file lacks: `n_pairs` of each tier, and six times as many hard or few."""
     held = {(row["tier"], row["job"]) for row in _lines(path)}
     jobs = [
         (tier, i)
         for k in range(n_pairs)
         for tier in TIERS
-        for i in (range(6 * k, 6 * k + 6) if tier == "hard" else (k,))
+        for i in (range(6 * k, 6 * k + 6) if tier in ("hard", "few") else (k,))
         if (tier, i) not in held
     ]
     with ProcessPoolExecutor(workers) as pool, path.open("a") as file:

@@ -60,11 +60,13 @@ def continued(
     told: list[dict[str, float]],
     right: NDArray[np.bool_],
     weight: NDArray[np.float64],
+    below: tuple[str, float] | None = None,
 ) -> dict[str, Any]:
     """Stored trees (`plain`) with more of them behind, fitted to answers that the first ones say too little of.
 
     What the first ones learned of other answers stays. Newton steps on the log-loss, each a shallow tree, monotone as
-    `SPEAKS` says.
+    `SPEAKS` says. With `below`, a feature's name and a number, they count where the feature is not above it, and change
+    nothing elsewhere.
     """
     from sklearn.tree import DecisionTreeRegressor
 
@@ -84,7 +86,8 @@ def continued(
             random_state=0,
         ).fit(X, slope / curve, sample_weight=weight * curve)
         log_odds = log_odds + RATE * tree.predict(X)
-        trees.append(_plain_tree(tree.tree_))
+        grown = _plain_tree(tree.tree_)
+        trees.append(grown if below is None else _beneath(names.index(below[0]), below[1], grown))
     return {**first, "trees": [*first["trees"], *trees]}
 
 
@@ -93,6 +96,17 @@ def _renamed(stored: dict[str, Any], names: list[str]) -> dict[str, Any]:
     row = np.array([names.index(name) for name in stored["names"]])
     trees = [{**tree, "feature": row[tree["feature"]].tolist()} for tree in stored["trees"]]
     return {**stored, "names": names, "trees": trees}
+
+
+def _beneath(feature: int, threshold: float, tree: dict[str, list[float]]) -> dict[str, list[float]]:
+    # A question before the tree's own; who answers no comes to a leaf of zero.
+    return {
+        "feature": [feature, 0, *tree["feature"]],
+        "threshold": [threshold, 0.0, *tree["threshold"]],
+        "left": [2, -1, *(node + 2 if node > 0 else -1 for node in tree["left"])],
+        "right": [1, -1, *(node + 2 if node > 0 else -1 for node in tree["right"])],
+        "value": [0.0, 0.0, *tree["value"]],
+    }
 
 
 def _plain_tree(tree: Any) -> dict[str, list[float]]:

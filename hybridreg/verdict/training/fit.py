@@ -4,13 +4,15 @@
     python -m hybridreg.verdict.training gather --rows runs/evidence.jsonl --pairs 40
     python -m hybridreg.verdict.training fit --rows runs/evidence.jsonl --write hybridreg/verdict
     python -m hybridreg.verdict.training continue --rows runs/evidence.jsonl --write hybridreg/verdict
+    python -m hybridreg.verdict.training continue --below compared 1000 --write hybridreg/verdict
     python -m hybridreg.verdict.training usual --rows runs/evidence.jsonl --write hybridreg/verdict
 
 `gather` writes one line for each answer (`hybridreg.verdict.training.answers`): its evidence, that of its best
 rival, that of all poses that were found, and what is right. `fit` prints how the rules do on pairs that they were not
 fitted to (five-fold), and writes them. `continue` leaves the support and the trees as they are and adds trees for what
-these answers say beside: new kinds of input, new evidence. `usual` writes the range that each number of right poses
-has, which reports show (`hybridreg.verdict.training.usual_range`).
+these answers say beside: new kinds of input, new evidence; with `--below` for those alone in which a number of the
+evidence is not above a bound, so that no other verdict changes. `usual` writes the range that each number of right
+poses has, which reports show (`hybridreg.verdict.training.usual_range`).
 """
 
 from __future__ import annotations
@@ -19,6 +21,7 @@ import argparse
 import json
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import partial
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -102,13 +105,13 @@ def _with_support(rows: list[Row], weights: dict[str, float], intercept: float) 
         yield Evidence(**told)
 
 
-def longer(rows: list[Row]) -> Rule:
-    """The shipped rule with more trees, fitted to these rows."""
+def longer(rows: list[Row], below: tuple[str, float] | None = None) -> Rule:
+    """The shipped rule with more trees, fitted to these rows; `below` as in `boosting.continued`."""
     weights, intercept = model()
     told = [features(evidence) for evidence in _with_support(rows, weights, intercept)]
     right, weight = np.array([row["right"] for row in rows]), np.array([row["weight"] for row in rows])
     shipped = json.loads(files("hybridreg.verdict").joinpath("confidence.json").read_text())
-    stored = continued(shipped, told, right, weight)
+    stored = continued(shipped, told, right, weight, below)
     return Rule(weights, intercept, Boosted.read(stored), stored)
 
 
@@ -151,6 +154,7 @@ def main() -> None:
     parser.add_argument("--rows", type=Path, default=Path("runs/evidence.jsonl"))
     parser.add_argument("--pairs", type=int, default=40, help="of each tier")
     parser.add_argument("--workers", type=int, default=2)
+    parser.add_argument("--below", nargs=2, metavar=("NAME", "BOUND"), help="continue for some answers alone")
     parser.add_argument("--write", type=Path, help="folder in which to write the rule as JSON")
     parser.add_argument("--picture", type=Path, help="draw the reliability curve of the five folds")
     options = parser.parse_args()
@@ -164,7 +168,11 @@ def main() -> None:
         if options.write:
             write_json(options.write / "usual.json", found)
         return
-    fitted = longer if options.what == "continue" else fit
+    fitted: Callable[[list[Row]], Rule] = fit
+    if options.what == "continue":
+        below = (options.below[0], float(options.below[1])) if options.below else None
+        rows = [row for row in rows if below is None or row["evidence"][below[0]] <= below[1]]
+        fitted = partial(longer, below=below)
     p = unseen(rows, fitted)
     report(rows, p)
     if options.picture:
