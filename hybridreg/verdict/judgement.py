@@ -12,7 +12,7 @@ from hybridreg.evidence import match_agreement
 from hybridreg.evidence.agreement import Agreement, OneWay
 from hybridreg.evidence.covariance import of_information
 from hybridreg.evidence.evidence import NO_RIVAL, Evidence, share
-from hybridreg.evidence.log_odds import NEARLY, log_odds
+from hybridreg.evidence.log_odds import log_odds
 from hybridreg.evidence.pose_evidence import PoseEvidence
 from hybridreg.evidence.scale import Size
 from hybridreg.evidence.views import View
@@ -24,7 +24,7 @@ from hybridreg.scene import Scene
 from hybridreg.search import rivals
 from hybridreg.search.hypothesis import Hypothesis, of_pose
 from hybridreg.search.ranking import best, told_apart
-from hybridreg.verdict.confidence import DOUBTED, Word, confidence, word
+from hybridreg.verdict.confidence import CLEAR, DOUBTED, Word, confidence, word
 from hybridreg.verdict.words import reasons
 
 Array = NDArray[np.float64]
@@ -228,4 +228,4 @@ def _unseen(scene: Scene) -> dict[str, str]:
 
 
 def _close(found: list[Hypothesis], support: float) -> Array:
-    return np.array([rival.T for rival in found if rival.log_odds > support - NEARLY]).reshape(-1, 4, 4)
+    return np.array([rival.T for rival in found if rival.log_odds > support - CLEAR]).reshape(-1, 4, 4)

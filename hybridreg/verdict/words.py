@@ -10,9 +10,8 @@ import numpy as np
 from hybridreg.evidence.agreement import Agreement
 from hybridreg.evidence.evidence import Evidence
 from hybridreg.evidence.information import Information
-from hybridreg.evidence.log_odds import NEARLY
 from hybridreg.resolution import Tolerance
-from hybridreg.verdict.confidence import SIZE_GAIN, SPARSE
+from hybridreg.verdict.confidence import CLEAR, SIZE_GAIN, SPARSE
 
 # The bounds beyond which a number is worth a sentence; nine in ten right poses of simulated scenes stay within them.
 # Share of the visible points that violates free space.
@@ -82,7 +81,7 @@ def _against(
     margin = evidence.rival_margin
     if margin > 0.0:
         yield f"another pose explains the data better (its support is higher by {margin:.2f}; see rivals)"
-    elif margin > -NEARLY:
+    elif margin > -CLEAR:
         yield f"another pose explains the data nearly as well (its support is lower by {-margin:.2f}; see rivals)"
     if held.weakest < WEAK:
         yield f"the pose is poorly constrained {held.words}: {held.weakest:.1%} of the surfaces' information"
