@@ -103,7 +103,8 @@ class Candidates(Stage):
         if confidence < _SURE:
             with scene.clock.phase("verdict"):
                 shut = shut_out.explanations(scene, beyond, found)
-                scene.explanations.extend(shut or input_mistakes.explanations(scene))
+                mistakes = shut or input_mistakes.explanations(scene, thorough=confidence >= OK)
+                scene.explanations.extend(mistakes)
         won = found[0].came_from if found else None
         return replace(pose, entries=tuple(trace._replace(won=trace.entry == won) for trace in traces))
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,12 +13,13 @@ from numpy.typing import NDArray
 from hybridreg import spec
 from hybridreg.cloud import PointCloud
 from hybridreg.evidence.log_odds import OK
-from hybridreg.matches import Correspondences
+from hybridreg.matches import Correspondences, Pose
 from hybridreg.pair import Pair
 from hybridreg.resolution import comparable, size_ratio
 from hybridreg.scene import Scene
-from hybridreg.search.hypothesis import seen_at
+from hybridreg.search.hypothesis import as_hypotheses, as_pose
 from hybridreg.search.ranking import HOPELESS
+from hybridreg.search.settle import best_first
 from hybridreg.verdict import weigh
 
 Array = NDArray[np.float64]
@@ -26,14 +28,17 @@ Array = NDArray[np.float64]
 _UNITS = ((0.001, "millimetres"), (0.01, "centimetres"), (0.3048, "feet"))
 # Poses that are tried under a mistake: the right one is among the first where the clouds fit well; by hand.
 _TRIES = 10
+# What finds a place in views that show little ground.
+_BY_FEATURES = {"stage": "kiss", "scale": 2.5}
 # Extents of two clouds of one place, in one unit, mostly differ by less than this factor; by hand.
 _ALIKE = 4.0
 
 
-def explanations(scene: Scene) -> list[str]:
+def explanations(scene: Scene, *, thorough: bool = False) -> list[str]:
     """Sentences for the mistakes under which the clouds fit: at most one, of those that make them "ok".
 
-    The pose that was found may be as likely: a room that is nearly its own mirror image tells neither.
+    The pose that was found may be as likely: a room that is nearly its own mirror image tells neither. `thorough`: search
+    by features too, as where that pose would be "ok".
     """
     for side, factors, sentence in _changes(scene.pair):
         pair = replace(scene.pair, image=None)
@@ -41,7 +46,7 @@ def explanations(scene: Scene) -> list[str]:
             pair = replace(pair, source=_changed(pair.source, factors))
         else:
             pair = replace(pair, target=_changed(pair.target, factors))
-        if _fit(pair) >= OK:
+        if _fit(pair, thorough) >= OK:
             return [sentence]
     return []
 
@@ -71,10 +76,23 @@ def _changed(cloud: PointCloud, factors: Array) -> PointCloud:
     return PointCloud(points=cloud.points * factors, said=seen._replace(places=seen.places * factors))
 
 
-def _fit(pair: Pair) -> float:
+def _fit(pair: Pair, thorough: bool) -> float:
     scene = spec.from_table("voxel", "downsample")(pair)
-    search = spec.from_table({"stage": "birdseye", "tries": _TRIES, "again": False}, "estimate")
-    pose = search(scene, Correspondences.none(), np.random.default_rng(0))
-    if not pose.found or seen_at(scene, [pose.T], 1)[0].log_odds < HOPELESS:
+    tables: list[dict[str, Any]] = [{"stage": "birdseye", "tries": _TRIES, "again": False}]
+    if thorough:
+        tables.append(_BY_FEATURES)
+    poses = [pose for table in tables if (pose := _estimated(scene, table)) is not None]
+    found = best_first(scene, [start for pose in poses for start in as_hypotheses(pose)[:_TRIES]])
+    if not found or found[0].log_odds < HOPELESS:
         return 0.0
-    return weigh(scene, pose).confidence
+    return weigh(scene, as_pose(found)).confidence
+
+
+def _estimated(scene: Scene, table: dict[str, Any]) -> Pose | None:
+    try:
+        pose: Pose = spec.from_table(table, "estimate")(
+            scene, Correspondences.none(), np.random.default_rng(0)
+        )
+    except ImportError:
+        return None
+    return pose if pose.found else None
