@@ -37,8 +37,8 @@ _ALIKE = 4.0
 def explanations(scene: Scene, *, thorough: bool = False) -> list[str]:
     """Sentences for the mistakes under which the clouds fit: at most one, of those that make them "ok".
 
-    The pose that was found may be as likely: a room that is nearly its own mirror image tells neither. `thorough`: search
-    by features too, as where that pose would be "ok".
+    The pose that was found may be as likely: a room that is nearly its own mirror image tells neither. `thorough`:
+    search by features too, as where that pose would be "ok".
     """
     for side, factors, sentence in _changes(scene.pair):
         pair = replace(scene.pair, image=None)
