@@ -187,8 +187,8 @@ def _training(network: SphereNet, plan: dict[str, Any], values: dict[str, Tensor
         found.close(name, state[name.removeprefix("train.out.")], values[name], TOLERANCE)
     gradients = {names[name]: parameter.grad for name, parameter in network.named_parameters()}
     for name in [name for name in values if name.startswith("train.grad.")]:
-        # Fourteen batch norms and ReLUs back, the first layer's gradient in float64 is 0.4 % from the recorded one, and on
-        # another processor in float32 1.03 %.
+        # Fourteen batch norms and ReLUs back, the first layer's gradient in float64 is 0.4 % from the recorded one, in
+        # float32 on another processor 1.03 %.
         bound = max(TOLERANCE, 0.02 * float(values[name].abs().max()))
         found.close(name, gradients[name.removeprefix("train.grad.")], values[name], bound)
     network.eval()
