@@ -115,10 +115,14 @@ class BirdsEye(Stage):
     def _levelled(self, own: Scene, scene: Scene) -> Iterator[Sequence[Array]]:
         if self.vertical != "sensor":
             as_shown = {side: own.level(side).ground for side in SIDES}
+            other = [side for side in SIDES if own.grounds[side] is not as_shown[side]]
+            for side in other:
+                scene.note(
+                    f"bird's-eye search: the {side} shows floor and ceiling, both sensors are taken to be upright; "
+                    'if one hangs upside down, say so: gravity="unknown" (--gravity unknown)'
+                )
             yield _by_ground(own, scene, own.grounds)
-            if any(
-                own.grounds[side] is not as_shown[side] for side in SIDES
-            ):  # one of the sensors may hang from the ceiling
+            if other:
                 yield _by_ground(own, scene, as_shown)
         if self.vertical == "sensor" or (self.vertical == "both" and _leans(own)):
             yield _by_sensor(own)

@@ -127,3 +127,4 @@ def test_rooms_are_found_upright(kind: str, seed: int, word: str) -> None:
     result = hr.register(made.source, made.target)
     assert is_right(made, result.transformation)
     assert result.verdict == word
+    assert any("hangs upside down" in note for note in result.notes) is (kind != "upside-down")
