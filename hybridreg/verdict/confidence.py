@@ -82,10 +82,9 @@ def confidence(evidence: Evidence, rule: Boosted | None = None) -> float:
         probability = FAILED
     if evidence.overturned:
         return min(probability, _OVERTURNED)
-    if told["rival_margin"] > -CLEAR:
-        probability = min(probability, DOUBTED)
+    resized, close = told["size_gain"] > SIZE_GAIN, told["rival_margin"] > -CLEAR
     by_chance = evidence.compared < SPARSE and evidence.agreed_rare < _AGREE
-    return min(probability, DOUBTED) if told["size_gain"] > SIZE_GAIN or by_chance else probability
+    return min(probability, DOUBTED) if resized or close or by_chance else probability
 
 
 def _one_of_two(told: Mapping[str, float], rule: Boosted) -> bool:

@@ -17,7 +17,7 @@ from hybridreg.evidence.pose_evidence import PoseEvidence
 from hybridreg.evidence.scale import Size
 from hybridreg.evidence.views import View
 from hybridreg.geometry.fitness import Overlay
-from hybridreg.geometry.ground_relief import nats
+from hybridreg.geometry.ground_relief import TELLS
 from hybridreg.matches import Correspondences, Pose
 from hybridreg.resolution import Tolerance, tolerance
 from hybridreg.scene import Scene
@@ -38,8 +38,6 @@ _LEAST_MARGIN = 0.05
 _THROUGH_WALLS = 0.04
 # Standard deviations within which 95 % of a normal distribution lie.
 _MOST_LIKELY = 1.96
-# Nats of the relief from which it holds a pose too: by hand, as in `hybridreg.verdict.training.observability`.
-_TELLS = 30.0
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -52,12 +50,15 @@ class Weighed:
     rivals : list of Hypothesis
         Settled, the likeliest first.
     evidence : Evidence
+    slack : Tolerance or None
+        By how much a right pose may well be off, where that is more than the tolerance.
     confidence : float in (0, 1)
     """
 
     at: PoseEvidence
     rivals: list[Hypothesis]
     evidence: Evidence
+    slack: Tolerance | None
     confidence: float
 
 
@@ -114,7 +115,7 @@ def judge(scene: Scene, pose: Pose, matches: Correspondences) -> Judgement:
         explained=bool(scene.explanations),
         started=scene.pair.placed is not None,
         through_walls=_through_walls(scene, evidence),
-        slack=_slack(scene, weighed.at, evidence),
+        slack=weighed.slack,
     )
     return Judgement(
         verdict=word(probability),
@@ -147,20 +148,20 @@ def weigh(scene: Scene, pose: Pose) -> Weighed:
     own, *found = told_apart([own, *(one for one in offered if scene.pair.allows(one.T))])
     found = best(found)
     evidence = evidence_of(own, found, at.size if pose.found else Size())
-    probability = confidence(evidence)
-    if _through_walls(scene, evidence) or _slack(scene, at, evidence):
+    slack, probability = _slack(scene, at), confidence(evidence)
+    if slack or _through_walls(scene, evidence):
         probability = min(probability, DOUBTED)
-    return Weighed(at=at, rivals=found, evidence=evidence, confidence=probability)
+    return Weighed(at=at, rivals=found, evidence=evidence, slack=slack, confidence=probability)
 
 
 def _through_walls(scene: Scene, evidence: Evidence) -> bool:
     return scene.pair.drawn and evidence.looked_through_rare > _THROUGH_WALLS
 
 
-def _slack(scene: Scene, at: PoseEvidence, evidence: Evidence) -> Tolerance | None:
+def _slack(scene: Scene, at: PoseEvidence) -> Tolerance | None:
     # Degrees and metres by which a right pose may well be off, where more than the tolerance; what relief adds is left
     # out of the covariance.
-    if nats(evidence.relief_cells, evidence.relief_correlation) > _TELLS:
+    if at.agreement.relief.information > TELLS:
         return None
     allowed = tolerance(scene.pair.source, scene.pair.target)
     C = of_information(at.information.matrix, allowed)

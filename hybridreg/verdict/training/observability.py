@@ -22,12 +22,10 @@ from hybridreg.classical.voxel import VoxelGrid
 from hybridreg.data import open_dataset
 from hybridreg.evidence import views
 from hybridreg.evidence.agreement import compare
+from hybridreg.geometry.ground_relief import TELLS
 
 # Borders of the table's classes, points.
 BORDERS = (0, 5, 20, 50, 100, 200, np.inf)
-# Information in the relief from which it tells, in nats; a search over all yaws and shifts finds as much by chance
-# where the ground is bare.
-TELLS = 30.0
 
 
 def observed(data: str) -> Iterator[tuple[float, bool]]:
