@@ -33,6 +33,22 @@ class Overlap:
         return cls(np.ones(n_source), np.ones(n_target))
 
 
+@dataclass(frozen=True, eq=False)
+class Described:
+    """Points of one cloud and what a matcher knows of each.
+
+    Attributes
+    ----------
+    points : (n, 3) float64
+        Metres, in the cloud's frame.
+    features : (n, d) float32
+        Of length one; two points look alike where their product is near one.
+    """
+
+    points: Array
+    features: NDArray[np.float32]
+
+
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Correspondences:
     """Pairs of points held to be the same place.
@@ -49,6 +65,8 @@ class Correspondences:
     spacing : float or None
         Typical distance of the points among which partners were sought, metres: no match can be nearer to right.
         None means the scene's own; a network that works on a grid of its own tells that grid's.
+    described : (Described, Described) or None
+        All points of source and target among which partners were sought; guided matching needs them.
     """
 
     source: Array
@@ -58,6 +76,7 @@ class Correspondences:
     source_index: Indices | None = None
     target_index: Indices | None = None
     spacing: float | None = None
+    described: tuple[Described, Described] | None = None
 
     def __post_init__(self) -> None:
         n = len(self.source)

@@ -51,6 +51,9 @@ class Lgr(Stage):
         None above: the same numbers as in that network's validation while it was trained.
     rival_share : float in [0, 1]
         A pose far from the best one is a rival when its support is at least this share of the best one's.
+    guided : bool
+        Then match all points anew near where the pose puts them (`hybridreg.learned.matching.guided_matching`), which
+        GeoTransformer does not. Needs a matcher that hands on its features.
     """
 
     max_distance: float | None = None
@@ -59,6 +62,7 @@ class Lgr(Stage):
     max_votes: int | None = None
     weights: str | None = None
     rival_share: float = 0.5
+    guided: bool = False
 
     needs: ClassVar[frozenset[str]] = frozenset({"matches", "group"})
 
@@ -87,6 +91,8 @@ class Lgr(Stage):
         with single():
             found = _estimate(scene, matches, rows, config)
             T: Array = found.transform.numpy()
+            if self.guided:
+                T = _guided(scene, matches, T)
             residual = np.linalg.norm(se3.apply(T, matches.source[rows]) - matches.target[rows], axis=1)
             inliers = np.zeros(len(matches), dtype=bool)
             inliers[rows] = residual < max_distance
@@ -126,6 +132,17 @@ class Lgr(Stage):
         found = modes(consensus, poses, consensus.counts(poses), refit=True, share=self.rival_share)
         far = np.array([one.T for one in found]).reshape(-1, 4, 4)
         return far[~same(far, T, np.median(source, axis=0), consensus)]
+
+
+def _guided(scene: Scene, matches: Correspondences, T: Array) -> Array:
+    from hybridreg.learned.matching.guided_matching import guided_pose
+
+    if matches.described is None:
+        raise ValueError(
+            f"pair {scene.pair.id}: guided matching compares features of all points, and this match stage hands on "
+            "none; use geotransformer or vgam, or guided = false"
+        )
+    return guided_pose(T, *matches.described, matches.spacing or scene.spacing)
 
 
 def _usable(matches: Correspondences) -> Rows:

@@ -7,12 +7,13 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar, Literal
 
 from hybridreg.learned.stages.network_stage import NetworkStage
-from hybridreg.matches import Correspondences, Overlap
+from hybridreg.matches import Correspondences, Described, Overlap
 from hybridreg.scene import Scene
 
 if TYPE_CHECKING:
     from typing_extensions import Self
 
+    from hybridreg.learned.cross3dreg.encodings import CloudEncoding, Encoding
     from hybridreg.learned.cross3dreg.network import RegistrationNetwork
     from hybridreg.learned.matching.point_matching import PointMatches
 
@@ -91,10 +92,12 @@ class NetworkMatcher(NetworkStage):
             kept = keep(scene, overlap, encoding, network.config, self.min_overlap)
             features = network.attend(encoding, kept)
             _, matches = network.match(encoding, kept, features, filtered=self.filtered)
-        return _correspondences(matches, network)
+        return _correspondences(matches, encoding, network)
 
 
-def _correspondences(matches: PointMatches, network: RegistrationNetwork) -> Correspondences:
+def _correspondences(
+    matches: PointMatches, encoding: Encoding, network: RegistrationNetwork
+) -> Correspondences:
     from hybridreg.learned.stages.tensor_values import array
 
     return Correspondences(
@@ -103,4 +106,14 @@ def _correspondences(matches: PointMatches, network: RegistrationNetwork) -> Cor
         weight=array(matches.weight),
         group=matches.group.cpu().numpy(),
         spacing=network.config.backbone.fine_voxel,
+        described=(_described(encoding.source), _described(encoding.target)),
     )
+
+
+def _described(cloud: CloudEncoding) -> Described:
+    from torch.nn.functional import normalize
+
+    from hybridreg.learned.stages.tensor_values import array
+
+    features = normalize(cloud.point_features, dim=1).detach().float().cpu().numpy()
+    return Described(array(cloud.points), features)

@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 import hybridreg as hr
 from hybridreg import testing
 from hybridreg.geometry import se3
-from hybridreg.matches import Correspondences
+from hybridreg.matches import Correspondences, Described
 from hybridreg.scene import Scene
 
 
@@ -99,6 +99,23 @@ def test_the_radius_follows_the_matches_then_the_scene(scene: Scene) -> None:
     assert counts[0] == 50, "half of the matches lie 0.55 m from the other half"
     assert counts[1] == 100
     assert counts[2] == 100
+
+
+def test_guided_matching_needs_features(scene: Scene) -> None:
+    with pytest.raises(ValueError, match="geotransformer or vgam, or guided = false"):
+        run(scene, planted(5, pose(5)), guided=True)
+
+
+def test_guided_matching_starts_where_the_vote_ended(scene: Scene) -> None:
+    T, rng = pose(8), np.random.default_rng(8)
+    points, features = rng.uniform(-15, 15, (400, 3)), rng.normal(size=(400, 16))
+    features = (features / np.linalg.norm(features, axis=1, keepdims=True)).astype(np.float32)
+    off = planted(8, se3.from_rt(np.eye(3), np.array([0.6, 0.0, 0.0])) @ T)
+    matches = dataclasses.replace(
+        off, spacing=0.8, described=(Described(points, features), Described(se3.apply(T, points), features))
+    )
+    assert not np.allclose(run(scene, matches).T, T, atol=0.1)
+    assert np.allclose(run(scene, matches, guided=True).T, T, atol=1e-6)
 
 
 @pytest.mark.parametrize("n", [0, 1, 2])
