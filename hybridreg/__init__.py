@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from hybridreg.classical.fgr import Fgr
     from hybridreg.classical.fpfh import Fpfh
     from hybridreg.classical.gicp import Gicp
-    from hybridreg.classical.hcf import Hcf
+    from hybridreg.classical.hcf.hcf import Hcf
     from hybridreg.classical.icp import Icp
     from hybridreg.classical.kiss import KissMatcher
     from hybridreg.classical.kiss_icp import KissIcp
@@ -64,7 +64,7 @@ _WHERE = {
     "hybridreg.classical.fgr": ["Fgr"],
     "hybridreg.classical.fpfh": ["Fpfh"],
     "hybridreg.classical.gicp": ["Gicp"],
-    "hybridreg.classical.hcf": ["Hcf"],
+    "hybridreg.classical.hcf.hcf": ["Hcf"],
     "hybridreg.classical.icp": ["Icp"],
     "hybridreg.classical.kiss": ["KissMatcher"],
     "hybridreg.classical.kiss_icp": ["KissIcp"],

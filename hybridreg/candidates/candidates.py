@@ -85,18 +85,18 @@ class Candidates(Stage):
 
     def __call__(self, scene: Scene, matches: Correspondences, rng: np.random.Generator) -> Pose:
         found: list[Hypothesis] = []
+        likelier: list[Hypothesis] = []
         traces: list[EntryTrace] = []
         beyond: list[Hypothesis | Array] = []
         pose, confidence = Pose.unknown(len(matches)), 0.0
         for every in self._worth_trying(scene).stages(scene, matches, rng, traces, beyond):
-            found = [one for one in every if scene.pair.allows(one.T)]
+            found = distinct(scene, [*(one for one in every if scene.pair.allows(one.T)), *likelier])
             if not found:
                 continue
             pose, confidence = as_pose(found), 0.0
             # To weigh a pose takes as long as to find some, and one that is rather wrong is not "ok".
             if found[0].log_odds > _LIKELY:
-                with scene.clock.phase("verdict"):
-                    pose = replace(pose, weighed=weigh(scene, pose))
+                found, pose = self._weighed(scene, found, likelier)
                 confidence = pose.weighed.confidence
             if confidence >= self.enough:
                 break
@@ -107,6 +107,20 @@ class Candidates(Stage):
                 scene.explanations.extend(mistakes)
         won = found[0].came_from if found else None
         return replace(pose, entries=tuple(trace._replace(won=trace.entry == won) for trace in traces))
+
+    def _weighed(
+        self, scene: Scene, found: list[Hypothesis], likelier: list[Hypothesis]
+    ) -> tuple[list[Hypothesis], Pose]:
+        # A rival that was looked for beside the best pose may turn out likelier; then that is the best, once refined.
+        for last in (False, True):
+            with scene.clock.phase("verdict"):
+                weighed = weigh(scene, as_pose(found))
+            better = [one for one in weighed.rivals if one.log_odds > weighed.evidence.support]
+            if last or not better:
+                break
+            likelier.append(self._refined(scene, better[0]).but(came_from=found[0].came_from))
+            found = [likelier[-1], *found]
+        return found, replace(as_pose(found), weighed=weighed)
 
     def _worth_trying(self, scene: Scene) -> Candidates:
         source, target = scene.pair.source, scene.pair.target

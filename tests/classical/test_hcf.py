@@ -5,9 +5,9 @@ import numpy as np
 import pytest
 from made_matches import planted
 
-from hybridreg.classical.compatibility import first_order, leading_eigenvectors, pick_seeds, second_order
-from hybridreg.classical.consensus_sets import filter_sets, first_sets, set_poses, set_weights
-from hybridreg.classical.hcf import Hcf
+from hybridreg.classical.hcf.compatibility import first_order, leading_eigenvectors, pick_seeds, second_order
+from hybridreg.classical.hcf.consensus_sets import filter_sets, first_sets, set_poses, set_weights
+from hybridreg.classical.hcf.hcf import Hcf
 from hybridreg.geometry import se3
 from hybridreg.matches import Correspondences, Pose
 from hybridreg.scene import Scene

@@ -38,7 +38,7 @@ _HARD, _FIRST_SEED = 2, 300
 
 _settle = settle.settle
 # The entries of `default` by what else a user would call them: left out one at a time.
-ENTRIES = {"KISS-Matcher": "kiss", "relief": "relief", "learned entry": "ransac"}
+ENTRIES = {"Manhattan": "manhattan", "KISS-Matcher": "kiss", "relief": "relief", "learned entry": "ransac"}
 # What is put in the place of each other move: module or class, name, replacement.
 PATCHES: dict[str, tuple[Any, str, Any]] = {
     "settling": (settle, "settle", lambda views, T, **how: T),
@@ -53,7 +53,7 @@ PATCHES: dict[str, tuple[Any, str, Any]] = {
     "bird's-eye by sensors": (birdseye, "_leans", lambda own: False),
     "second look": (candidates, "second_look", lambda scene: []),
     "repeats as rivals": (rivals, "copies", lambda views, T, axes: []),
-    "half turns as rivals": (rivals, "_turned", lambda own: []),
+    "turns as rivals": (rivals, "_turned", lambda own: []),
 }
 NONE = "none"
 MOVES = (NONE, *PATCHES, *ENTRIES)

@@ -10,9 +10,9 @@ import torch
 from ties import Compared
 from torch import Tensor
 
-from hybridreg.classical.compatibility import first_order, leading_eigenvectors, pick_seeds, second_order
-from hybridreg.classical.consensus_sets import filter_sets, first_sets, set_poses, set_weights
-from hybridreg.classical.hcf import Hcf
+from hybridreg.classical.hcf.compatibility import first_order, leading_eigenvectors, pick_seeds, second_order
+from hybridreg.classical.hcf.consensus_sets import filter_sets, first_sets, set_poses, set_weights
+from hybridreg.classical.hcf.hcf import Hcf
 from hybridreg.geometry import se3
 
 TOLERANCE = 1e-4

@@ -13,8 +13,8 @@ import torch
 from streets import street
 from torch.nn import functional as F
 
-from hybridreg.classical.compatibility import first_order, leading_eigenvectors, pick_seeds, second_order
-from hybridreg.classical.consensus_sets import filter_sets, first_sets, set_poses, set_weights
+from hybridreg.classical.hcf.compatibility import first_order, leading_eigenvectors, pick_seeds, second_order
+from hybridreg.classical.hcf.consensus_sets import filter_sets, first_sets, set_poses, set_weights
 from hybridreg.geometry import se3
 from hybridreg.learned.vrhcf.batch import SphereBatch, make_batch
 from hybridreg.learned.vrhcf.keypoint_matching import match_descriptors

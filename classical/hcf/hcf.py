@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
-from hybridreg.classical.compatibility import first_order, leading_eigenvectors, pick_seeds, second_order
-from hybridreg.classical.consensus_sets import filter_sets, first_sets, set_poses, set_weights
+from hybridreg.classical.hcf.compatibility import first_order, leading_eigenvectors, pick_seeds, second_order
+from hybridreg.classical.hcf.consensus_sets import filter_sets, first_sets, set_poses, set_weights
 from hybridreg.classical.pose_modes import modes, same
 from hybridreg.config import limits
 from hybridreg.geometry import se3

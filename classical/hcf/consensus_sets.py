@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from hybridreg.classical.compatibility import Floats, Rows, leading_eigenvectors
+from hybridreg.classical.hcf.compatibility import Floats, Rows, leading_eigenvectors
 from hybridreg.geometry.kabsch import kabsch_batch
 
 Array = NDArray[np.float64]

@@ -1,0 +1,2 @@
+# SPDX-License-Identifier: MIT
+"""Hierarchical correspondence filtering (VRHCF)."""
