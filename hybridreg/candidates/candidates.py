@@ -39,6 +39,8 @@ _REFINED = 2
 _UNREFINED = -3.0
 # Log-odds by which a pose may fall when it is refined: by hand.
 _NOISE = 1.0
+# Log-odds by which a rival is likelier than the pose that it was looked for beside: by hand.
+_BETTER = 0.5
 # Log-odds above which a pose is weighed: by hand.
 _LIKELY = 0.0
 
@@ -115,7 +117,7 @@ class Candidates(Stage):
         for last in (False, True):
             with scene.clock.phase("verdict"):
                 weighed = weigh(scene, as_pose(found))
-            better = [one for one in weighed.rivals if one.log_odds > weighed.evidence.support]
+            better = [one for one in weighed.rivals if one.log_odds > weighed.evidence.support + _BETTER]
             if last or not better:
                 break
             likelier.append(self._refined(scene, better[0]).but(came_from=found[0].came_from))
