@@ -33,6 +33,10 @@ class Manhattan(Stage):
 
     def __call__(self, scene: Scene, matches: Correspondences, rng: np.random.Generator) -> Pose:
         both = views.of(scene)
-        source, target = main_axes(both.source.normals), main_axes(both.target.normals)
+        source, target = (_right_handed(main_axes(view.normals)) for view in (both.source, both.target))
         found = best_first(scene, list(poses(both, target, target.T @ TURNS @ source)))
         return as_pose(found) if found else Pose.unknown()
+
+
+def _right_handed(axes: Array) -> Array:
+    return axes * np.linalg.det(axes)

@@ -24,6 +24,8 @@ Value = TypeVar("Value")
 
 # Coordinates above this are a map grid's, not a sensor's: 10 km leaves float32 code 1 mm of resolution.
 _MAP_GRID = 1e4
+# Points between which a cloud has an `apart`: by hand.
+_SPARSE = (2_000, 20_000)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -148,6 +150,12 @@ class PointCloud:
     def bounds(self) -> tuple[Array, Array]:
         """Lower and upper corner, each (3,), of the box around the points."""
         return extent.bounds(self.points)
+
+    @cached_property
+    def apart(self) -> float:
+        """Median distance of nearest neighbours, metres; 0 where there are so many points that it is short beside their
+        extent, or so few that it says more about what was left out."""
+        return extent.apart(self.points) if _SPARSE[0] <= len(self) <= _SPARSE[1] else 0.0
 
     @cached_property
     def radii(self) -> Array:
