@@ -24,6 +24,7 @@ from hybridreg.search.ranking import HOPELESS, counted, distinct
 from hybridreg.search.settle import best_first, second_look
 from hybridreg.stage import Stage
 from hybridreg.verdict import weigh
+from hybridreg.verdict.confidence import DOUBTED
 
 Array = NDArray[np.float64]
 Entry = Mapping[str, Any]
@@ -105,7 +106,7 @@ class Candidates(Stage):
         if confidence < _SURE:
             with scene.clock.phase("verdict"):
                 shut = shut_out.explanations(scene, beyond, found)
-                mistakes = shut or input_mistakes.explanations(scene, thorough=confidence >= OK)
+                mistakes = shut or input_mistakes.explanations(scene, thorough=confidence >= DOUBTED)
                 scene.explanations.extend(mistakes)
         won = found[0].came_from if found else None
         return replace(pose, entries=tuple(trace._replace(won=trace.entry == won) for trace in traces))

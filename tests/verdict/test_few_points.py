@@ -35,7 +35,7 @@ NONE = Correspondences.none()
         (410, "ok"),
         (438, "ok"),
         (414, "doubtful"),
-        (422, "doubtful"),
+        (472, "doubtful"),
         (428, "doubtful"),
     ],
 )
