@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from hybridreg.classical.icp import Icp
     from hybridreg.classical.kiss import KissMatcher
     from hybridreg.classical.kiss_icp import KissIcp
+    from hybridreg.classical.manhattan import Manhattan
     from hybridreg.classical.nothing import GivenMatches, Identity, NoMatch, NoOverlap, NoRefinement
     from hybridreg.classical.overhead.birdseye import BirdsEye
     from hybridreg.classical.overhead.relief_search import ReliefSearch
@@ -68,6 +69,7 @@ _WHERE = {
     "hybridreg.classical.icp": ["Icp"],
     "hybridreg.classical.kiss": ["KissMatcher"],
     "hybridreg.classical.kiss_icp": ["KissIcp"],
+    "hybridreg.classical.manhattan": ["Manhattan"],
     "hybridreg.classical.nothing": ["GivenMatches", "Identity", "NoMatch", "NoOverlap", "NoRefinement"],
     "hybridreg.classical.ransac": ["Ransac"],
     "hybridreg.classical.ransac_50k": ["Ransac50k"],

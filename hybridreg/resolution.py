@@ -18,6 +18,8 @@ _CELLS_ALONG_REACH = 60.0
 # Voxel per distance of neighbouring points, at least. Of 150 objects with even seeds, four right poses were "failed"
 # without it, two with 1.5 or 2.2.
 _OF_APART = 2.0
+# Cells along the extent, at least, however far points are apart: the other cloud may be in another unit; by hand.
+_FEWEST_CELLS = 20.0
 # Steps of a derived voxel in a power of ten, for a prepared target: a quarter larger each; by hand.
 _STEPS = 10
 # Cell of a map seen from above.
@@ -39,8 +41,8 @@ def default_voxel(source: PointCloud, target: PointCloud) -> float:
     shorter = min(reach(source.radii), reach(target.radii))
     # A cloud whose points lie nearly all in one place has no such extent; its bounding box is the next best.
     length = shorter or max(_longest(cloud) for cloud in (source, target))
-    apart = max(cloud.apart for cloud in (source, target))
-    voxel = float(f"{max(length / _CELLS_ALONG_REACH, _OF_APART * apart):.2g}")
+    apart = min(_OF_APART * max(source.apart, target.apart), length / _FEWEST_CELLS)
+    voxel = float(f"{max(length / _CELLS_ALONG_REACH, apart):.2g}")
     if voxel > 0.0 and (source.kept is not None or target.kept is not None):
         # So that scans of one sensor share what is kept.
         return float(f"{10.0 ** (round(_STEPS * np.log10(voxel)) / _STEPS):.2g}")

@@ -52,9 +52,9 @@ class Candidates(Stage):
 
     Every pose that an entry offers is settled and ranked by its log-odds (`hybridreg.evidence.log_odds`), the best are
     refined, and the best of these is weighed with the others as its rivals. A pose that several entries found is more
-    credible; one that the surfaces hardly constrain is moved to where it is likelier. Later entries are not run once
-    the confidence is `enough`. Where none brings it, all starts are examined a second time, and likelier poses are
-    looked for around the best. What was not chosen is returned as `rivals`, what each entry did as `entries`.
+    credible; a rival that turns out likelier takes its place. Later entries are not run once the confidence is
+    `enough`. Where none brings it, all starts are examined a second time. What was not chosen is returned as `rivals`,
+    what each entry did as `entries`.
 
     Parameters
     ----------

@@ -82,5 +82,6 @@ class _Sides:
         held = np.zeros((6, _CELLS, _CELLS, _CELLS), dtype=np.float32)
         at = np.floor((self.along - self.low) / cell).astype(np.int64)
         inside = ((at >= 0) & (at < _CELLS)).all(axis=1)
-        held[self.side[inside], *at[inside].T] = 1.0
+        x, y, z = at[inside].T
+        held[self.side[inside], x, y, z] = 1.0
         return held

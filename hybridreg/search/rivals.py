@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 from hybridreg.evidence import match_agreement
 from hybridreg.evidence.pose_evidence import PoseEvidence
 from hybridreg.evidence.surface_distance import settle_closely
-from hybridreg.geometry import se3
 from hybridreg.matches import Pose
 from hybridreg.scene import Scene
 from hybridreg.search.axis_turns import TURNS, poses

@@ -164,3 +164,25 @@ def test_the_other_copy_of_a_doubled_map_is_found_where_only_a_slide_along_it_sh
     assert is_right(doubled, result.transformation)
     assert result.verdict == "doubtful"
     assert any(is_right(doubled, T) for T in result.rivals)
+
+
+@pytest.mark.parametrize("seed", [774, 792])
+def test_an_object_that_looks_alike_after_a_turn_is_not_ok_the_wrong_way_round(seed: int) -> None:
+    made = hard.sample("object", seed)
+    result = hr.register(made.source, made.target)
+    assert is_right(made, result.transformation) or result.verdict != "ok"
+
+
+@pytest.mark.parametrize("kind, seed", [("depth-room", 708), ("building", 714)])
+def test_a_rival_that_is_likelier_becomes_the_pose(kind: str, seed: int) -> None:
+    made = hard.sample(kind, seed)
+    assert is_right(made, hr.register(made.source, made.target).transformation)
+
+
+@pytest.mark.parametrize("seed", [714, 992])
+def test_a_small_object_is_not_compared_more_finely_than_it_was_seen(seed: int) -> None:
+    # Points 0.8 and 1.2 mm apart; a sixtieth of the extent is less.
+    made = hard.sample("object", seed)
+    result = hr.register(made.source, made.target)
+    assert is_right(made, result.transformation)
+    assert result.verdict != "failed"
