@@ -21,6 +21,7 @@ from hybridreg.search.hypothesis import as_hypotheses, as_pose
 from hybridreg.search.ranking import HOPELESS
 from hybridreg.search.settle import best_first
 from hybridreg.verdict import weigh
+from hybridreg.verdict.confidence import DOUBTED
 
 Array = NDArray[np.float64]
 
@@ -29,7 +30,7 @@ _UNITS = ((0.001, "millimetres"), (0.01, "centimetres"), (0.3048, "feet"))
 # Poses that are tried under a mistake: the right one is among the first where the clouds fit well; by hand.
 _TRIES = 10
 # What finds a place in views that show little ground.
-_BY_FEATURES = {"stage": "kiss", "scale": 2.5}
+_THOROUGH: tuple[dict[str, Any], ...] = ({"stage": "manhattan"}, {"stage": "kiss", "scale": 2.5})
 # Extents of two clouds of one place, in one unit, mostly differ by less than this factor; by hand.
 _ALIKE = 4.0
 
@@ -37,16 +38,17 @@ _ALIKE = 4.0
 def explanations(scene: Scene, *, thorough: bool = False) -> list[str]:
     """Sentences for the mistakes under which the clouds fit: at most one, of those that make them "ok".
 
-    The pose that was found may be as likely: a room that is nearly its own mirror image tells neither. `thorough`:
-    search by features too, as where that pose would be "ok".
+    The pose that was found may be as likely: a room that is nearly its own mirror image tells neither. `thorough`, as
+    where that pose would be "ok": search further, and take what is "ok" but for a bound.
     """
+    enough = DOUBTED if thorough else OK
     for side, factors, sentence in _changes(scene.pair):
         pair = replace(scene.pair, image=None)
         if side == "source":
             pair = replace(pair, source=_changed(pair.source, factors))
         else:
             pair = replace(pair, target=_changed(pair.target, factors))
-        if _fit(pair, thorough) >= OK:
+        if _fit(pair, thorough) >= enough:
             return [sentence]
     return []
 
@@ -80,7 +82,7 @@ def _fit(pair: Pair, thorough: bool) -> float:
     scene = spec.from_table("voxel", "downsample")(pair)
     tables: list[dict[str, Any]] = [{"stage": "birdseye", "tries": _TRIES, "again": False}]
     if thorough:
-        tables.append(_BY_FEATURES)
+        tables.extend(_THOROUGH)
     poses = [pose for table in tables if (pose := _estimated(scene, table)) is not None]
     found = best_first(scene, [start for pose in poses for start in as_hypotheses(pose)[:_TRIES]])
     if not found or found[0].log_odds < HOPELESS:
