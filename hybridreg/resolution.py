@@ -15,6 +15,8 @@ Array = NDArray[np.float64]
 
 # Cells along the extent. On vehicle LiDAR (extent 25-50 m) this gives 0.4-0.8 m, in a room 5 cm.
 _CELLS_ALONG_REACH = 60.0
+# Extent of a thing, metres, at most: a LiDAR's points lie close together along its rings, which says nothing; by hand.
+_THING = 1.0
 # Voxel per distance of neighbouring points, at least. Of 150 objects with even seeds, four right poses were "failed"
 # without it, two with 1.5 or 2.2.
 _OF_APART = 2.0
@@ -35,14 +37,16 @@ _OF_REACH = 0.04
 def default_voxel(source: PointCloud, target: PointCloud) -> float:
     """Voxel for a pair, metres: the shorter of the two extents over 60, to two digits.
 
-    A cloud's extent is the distance from its middle within which nine tenths of its points lie. At least twice
-    the distance of neighbouring points, as on a small object before a depth camera: nothing is seen between them.
+    A cloud's extent is the distance from its middle within which nine tenths of its points lie. Of a thing before a
+    depth camera at least twice the distance of neighbouring points: nothing is seen between them.
     """
     shorter = min(reach(source.radii), reach(target.radii))
     # A cloud whose points lie nearly all in one place has no such extent; its bounding box is the next best.
     length = shorter or max(_longest(cloud) for cloud in (source, target))
-    apart = min(_OF_APART * max(source.apart, target.apart), length / _FEWEST_CELLS)
-    voxel = float(f"{max(length / _CELLS_ALONG_REACH, apart):.2g}")
+    voxel = length / _CELLS_ALONG_REACH
+    if length < _THING:
+        voxel = max(voxel, min(_OF_APART * max(source.apart, target.apart), length / _FEWEST_CELLS))
+    voxel = float(f"{voxel:.2g}")
     if voxel > 0.0 and (source.kept is not None or target.kept is not None):
         # So that scans of one sensor share what is kept.
         return float(f"{10.0 ** (round(_STEPS * np.log10(voxel)) / _STEPS):.2g}")

@@ -36,9 +36,9 @@ _LEAST_MARGIN = 0.05
 # Share of the walls drawn through flat scans that may be seen through: of 59 right poses on training pairs none has
 # more than 0.03, of the wrong ones that are likely otherwise none less than 0.05.
 _THROUGH_WALLS = 0.04
-# Log-odds from which a rival may be right though it is far behind, where nothing shows which way is up: of a box that
-# was seen from two sides, a wrong turn lays one side upon the other, and more agrees than at the true pose. Of 795
-# right training poses 27 have such a rival; by hand.
+# Log-odds from which a rival may be right though it is far behind, where nothing shows which way is up, or walls are
+# all there is: of a box that was seen from two sides, a wrong turn lays one side upon the other, and more agrees than
+# at the true pose. Of 795 right training poses 27 have such a rival; by hand.
 _ALIKE = 2.0
 # Standard deviations within which 95 % of a normal distribution lie.
 _MOST_LIKELY = 1.96
@@ -153,14 +153,14 @@ def weigh(scene: Scene, pose: Pose) -> Weighed:
     found = best(found)
     evidence = evidence_of(own, found, at.size if pose.found else Size())
     slack, probability = _slack(scene, at), confidence(evidence)
-    if slack or _through_walls(scene, evidence) or _looks_alike(at, found):
+    if slack or _through_walls(scene, evidence) or _looks_alike(scene, at, found):
         probability = min(probability, DOUBTED)
     return Weighed(at=at, rivals=found, evidence=evidence, slack=slack, confidence=probability)
 
 
-def _looks_alike(at: PoseEvidence, found: list[Hypothesis]) -> bool:
+def _looks_alike(scene: Scene, at: PoseEvidence, found: list[Hypothesis]) -> bool:
     upright = at.views.source.ground is not None and at.views.target.ground is not None
-    return not upright and any(one.by_surfaces > _ALIKE for one in found)
+    return (scene.pair.drawn or not upright) and any(one.by_surfaces > _ALIKE for one in found)
 
 
 def _through_walls(scene: Scene, evidence: Evidence) -> bool:
