@@ -24,8 +24,8 @@ Array = NDArray[np.float64]
 class Manhattan(Stage):
     """Search the 24 rotations that map the main axes of one cloud onto those of the other.
 
-    For rooms, buildings and things made of boxes, seen from anywhere and held anyhow: neither the ground nor the
-    vertical need be known. The main axes are the three orthogonal directions that most surfaces face
+    For rooms, buildings and things made of boxes, in any orientation: neither the ground nor the vertical need be
+    known. The main axes are the three orthogonal directions that most surfaces face
     (`hybridreg.geometry.main_axes`). For each rotation the shift is taken at which most surfaces meet that face the
     same way; these poses are settled on the surfaces and ranked by their log-odds. The others are returned as
     `rivals`.

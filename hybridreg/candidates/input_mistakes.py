@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""When no pose fits: would one fit the source's mirror image, or the source in another unit?"""
+"""Where a pose is not beyond doubt: would one fit the source's mirror image, or the source in another unit?"""
 
 from __future__ import annotations
 
@@ -38,8 +38,8 @@ _ALIKE = 4.0
 def explanations(scene: Scene, *, thorough: bool = False) -> list[str]:
     """Sentences for the mistakes under which the clouds fit: at most one, of those that make them "ok".
 
-    The pose that was found may be as likely: a room that is nearly its own mirror image tells neither. `thorough`, as
-    where that pose would be "ok": search further, and take what is "ok" but for a bound.
+    The pose that was found may be as likely: a room that is nearly its own mirror image tells neither. `thorough`, for
+    where that pose is "ok" or would be but for a bound: search further, and take what fits as well.
     """
     enough = DOUBTED if thorough else OK
     for side, factors, sentence in _changes(scene.pair):

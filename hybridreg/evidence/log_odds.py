@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 
 # Probability from which a pose is "ok": by hand.
 OK = 0.95
-# Log-odds of that. A rival whose log-odds lie less below the pose's explains the data nearly as well.
+# Log-odds of that.
 NEARLY = float(np.log(OK / (1.0 - OK)))
 # Information per point below which a direction is open, however little there is: by hand.
 _UNHELD = 1e-4

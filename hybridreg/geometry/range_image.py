@@ -3,8 +3,8 @@
 
 A grid of rows and columns suits one kind of sensor in one orientation. Here the directions themselves are the
 image: returns thinned to cells of equal angle on the sphere, and a KD-tree over them. It works alike for rings, fans,
-rosettes and hemispheres, upright or not, and a rotated cloud gives the same results. Free space, the test that a pose
-must pass, is `RangeImage.look` (docs/methods.md 12.1).
+rosettes and hemispheres, upright or not, and a rotated cloud gives the same results. `RangeImage.look` tells
+which points of the other cloud lie where this sensor saw through: free-space violations (docs/methods.md 12.1).
 """
 
 from __future__ import annotations

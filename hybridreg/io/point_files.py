@@ -30,7 +30,7 @@ from hybridreg.io.recorded.vtk_surface import read_vtp
 from hybridreg.io.signatures import kind_of
 from hybridreg.io.whole_files import check_file, read_whole
 
-# Bytes in which the header of a PCD file ends, and in which a file shows what it is.
+# Bytes within which the header of a PCD file ends, and those that show what a file is.
 _HEADER, _OPENING = 65_536, 4096
 # Endings of one format.
 _ALIKE = {".laz": ".las", ".arrow": ".feather"}
@@ -76,7 +76,7 @@ READERS: dict[str, Reader] = {
     **dict.fromkeys((".obj", ".stl", ".off", ".glb", ".gltf"), read_mesh),
     ".vtp": read_vtp,
 }
-"""Readers that go to the file themselves, through packages of others; those in which some clouds lie may choose one."""
+"""Readers that go to the file themselves, through other packages; where a file holds several clouds, they may choose one."""
 
 _SEVERAL = (".bag", ".db3", ".mcap", ".e57", ".lvx2")
 

@@ -26,8 +26,7 @@ Word = Literal["ok", "doubtful", "failed"]
 FAILED = 0.5
 # Probability of a pose that turns the world upside down, at most: by hand.
 _OVERTURNED = 0.3
-# Probability of a pose that chance may explain, at which the source fits better at another scale, or whose input looks
-# mistaken, at most: by hand.
+# Probability of a pose that some rule leaves in doubt (docs/methods.md 12.7), at most: by hand.
 DOUBTED = 0.9
 # Nats per point from which it fits better at another scale: of some 400 right training poses none gained 0.08.
 SIZE_GAIN = 0.12

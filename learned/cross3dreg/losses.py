@@ -12,7 +12,7 @@ from hybridreg.learned.cross3dreg.config import LossConfig
 from hybridreg.learned.cross3dreg.overlap_predictor import OverlapLogits
 from hybridreg.learned.cross3dreg.superpoint_mask import Kept
 from hybridreg.learned.cross3dreg.targets import Targets
-from hybridreg.learned.losses.mask_loss import focal_loss
+from hybridreg.learned.losses.focal_loss import focal_loss
 
 
 @dataclass(frozen=True)

@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""One training step's forward pass: the only place where a network meets the ground truth (docs/methods.md 5.4,
-7.4)."""
+"""One training step's forward pass: this network's parts under the true mask and pose (docs/methods.md 5.4, 7.4)."""
 
 from __future__ import annotations
 

@@ -19,7 +19,7 @@ from hybridreg.learned.cross3dreg.training_mask import MaskJitter, training_mask
 from hybridreg.learned.cross3dreg.training_step import sample_target_pairs, training_losses
 from hybridreg.learned.losses.circle_loss import circle_loss
 from hybridreg.learned.losses.fine_loss import assignment_loss, true_assignment
-from hybridreg.learned.losses.mask_loss import focal_loss
+from hybridreg.learned.losses.focal_loss import focal_loss
 from hybridreg.learned.matching.patch_pairs import PatchPairs
 
 
