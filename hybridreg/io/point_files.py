@@ -76,7 +76,7 @@ READERS: dict[str, Reader] = {
     **dict.fromkeys((".obj", ".stl", ".off", ".glb", ".gltf"), read_mesh),
     ".vtp": read_vtp,
 }
-"""Readers that go to the file themselves, through other packages; where a file holds several clouds, they may choose one."""
+"""Readers that go to the file themselves, through other packages; of several clouds in one file they may choose one."""
 
 _SEVERAL = (".bag", ".db3", ".mcap", ".e57", ".lvx2")
 

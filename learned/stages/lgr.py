@@ -52,8 +52,8 @@ class Lgr(Stage):
     rival_share : float in [0, 1]
         A pose far from the best one is a rival when its support is at least this share of the best one's.
     guided : bool
-        Once LGR has a pose, match all points anew near where it puts them (`hybridreg.learned.matching.guided_matching`), which
-        GeoTransformer does not. Needs a matcher that hands on its features.
+        Once LGR has a pose, match all points anew near where it puts them, which GeoTransformer does not
+        (`hybridreg.learned.matching.guided_matching`). Needs a matcher that hands on its features.
     """
 
     max_distance: float | None = None
