@@ -12,9 +12,9 @@ Array = NDArray[np.float64]
 
 # The distance, metres, that makes the information's inverse an honest covariance: neighbouring points err together
 # and surfaces are not planes, so that it is ten times a sensor's noise. Of 105 right "ok" poses on `sim:val` (all
-# tiers) 95 % lie within the 95 % ellipsoid of six degrees of freedom, 93 % within that of 90 %, 76 % within that of 50 %: too
-# wide in the middle, as the errors have longer tails than a normal distribution. Fitted to one half of the poses it
-# holds 93 to 96 % of the other. Where the scene, and so the tolerance, is smaller, it shrinks with them.
+# tiers) 95 % lie within the 95 % ellipsoid of six degrees of freedom, 93 % within that of 90 %, 76 % within that of
+# 50 %: too wide in the middle, as the errors have longer tails than a normal distribution. Fitted to one half of the
+# poses it holds 93 to 96 % of the other. Where the scene, and so the tolerance, is smaller, it shrinks with them.
 NOISE = 0.19
 # No pose is known better than this, however many points say so.
 FLOOR_RADIANS, FLOOR_METRES = 1e-4, 1e-3
