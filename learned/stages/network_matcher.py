@@ -92,7 +92,7 @@ class NetworkMatcher(NetworkStage):
             kept = keep(scene, overlap, encoding, network.config, self.min_overlap)
             features = network.attend(encoding, kept)
             _, matches = network.match(encoding, kept, features, filtered=self.filtered)
-        return _correspondences(matches, encoding, network)
+            return _correspondences(matches, encoding, network)
 
 
 def _correspondences(

@@ -38,9 +38,9 @@ def test_scans_of_different_rooms_are_not_ok(here: int, there: int) -> None:
 
 
 def test_walls_that_are_seen_through_are_told() -> None:
-    result = hr.register(sample("flat", 534).source, sample("flat", 536).target)
+    result = hr.register(sample("flat", 418).source, sample("flat", 440).target)
 
-    assert result.verdict == "doubtful"
+    assert result.verdict != "ok"
     assert "saw through" in result.reasons[0]
     assert "of the walls" in result.reasons[0]
 
