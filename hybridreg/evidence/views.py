@@ -87,6 +87,13 @@ class Views:
     target: View
     spacing: float
 
+    @property
+    def up(self) -> Array | None:
+        """The vertical (3,) in the target's frame, where both clouds show their ground; else None."""
+        if self.source.ground is None or self.target.ground is None:
+            return None
+        return self.target.ground.up
+
     @cached_property
     def fine(self) -> FineSurfaces:
         """Surfaces as fine as the clouds show them."""

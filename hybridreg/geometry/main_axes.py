@@ -18,7 +18,7 @@ _SAMPLE = 1_000
 
 def main_axes(*facing: Array) -> Array:
     """Three orthogonal directions (..., 3, 3), rows, around which the normals (..., n, 3) of one or more clouds
-    cluster, the most common first; every cloud has the same weight.
+    cluster, the most common first; every cloud has the same weight. They may form a left-handed frame.
 
     Eigenvectors of the normals' scatter alone are ambiguous where two directions are equally common (the floor and the
     walls of a room). From there the sum of fourth powers of the normals' components is maximised over rotations, by

@@ -50,10 +50,10 @@ def find(scene: Scene, own: PoseEvidence, pose: Pose) -> list[Hypothesis]:
     guesses += [*turned[_FULLEST:], *copies(views, own.T, own.agreement.axes)]
     promising = [*known, *seen_at(scene, [T for T in guesses if is_rival(T)], _QUICK)]
     likeliest = best(with_matches(one) for one in promising if is_rival(one.T))[:_SETTLED]
-    likeliest += seen_at(scene, [T for T in turned[:_FULLEST] if is_rival(T)], _QUICK)
-    guessed = np.array([one.T for one in likeliest if not one.settled]).reshape(-1, 4, 4)
-    moved = iter(seen_at(scene, settle(views, guessed), _CLOSE))
-    rivals = [one if one.settled else next(moved) for one in likeliest]
+    guessed = [one.T for one in likeliest if not one.settled]
+    guessed += [T for T in turned[:_FULLEST] if is_rival(T)]
+    moved = seen_at(scene, settle(views, np.array(guessed).reshape(-1, 4, 4)), _CLOSE)
+    rivals = [*(one for one in likeliest if one.settled), *moved]
     # Guesses that come back to the pose are no rivals, and must not hide those behind them.
     apart = best(with_matches(one) for one in rivals if is_rival(one.T))[:_ENOUGH]
 
@@ -70,7 +70,6 @@ def _turned(own: PoseEvidence) -> Array:
     # after a quarter of one. Where both clouds show the ground, only about the vertical.
     views, axes = own.views, own.agreement.axes
     turns = axes.T @ TURNS[1:] @ axes
-    if views.source.ground is not None and views.target.ground is not None:
-        up = views.target.ground.up
+    if (up := views.up) is not None:
         turns = turns[np.einsum("i,kij,j->k", up, turns, up) > _UPRIGHT]
     return poses(views, axes, turns @ own.T[:3, :3])

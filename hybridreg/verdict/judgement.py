@@ -159,8 +159,7 @@ def weigh(scene: Scene, pose: Pose) -> Weighed:
 
 
 def _looks_alike(scene: Scene, at: PoseEvidence, found: list[Hypothesis]) -> bool:
-    upright = at.views.source.ground is not None and at.views.target.ground is not None
-    return (scene.pair.drawn or not upright) and any(one.by_surfaces > _ALIKE for one in found)
+    return (scene.pair.drawn or at.views.up is None) and any(one.by_surfaces > _ALIKE for one in found)
 
 
 def _through_walls(scene: Scene, evidence: Evidence) -> bool:

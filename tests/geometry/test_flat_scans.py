@@ -38,9 +38,9 @@ def test_scans_of_different_rooms_are_not_ok(here: int, there: int) -> None:
 
 
 def test_walls_that_are_seen_through_are_told() -> None:
-    result = hr.register(sample("flat", 418).source, sample("flat", 440).target)
+    result = hr.register(sample("flat", 500).source, sample("flat", 502).target)
 
-    assert result.verdict != "ok"
+    assert result.verdict == "doubtful"
     assert "saw through" in result.reasons[0]
     assert "of the walls" in result.reasons[0]
 
