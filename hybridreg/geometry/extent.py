@@ -25,8 +25,8 @@ def bounds(points: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any]]:
     return np.array([column.min() for column in columns]), np.array([column.max() for column in columns])
 
 
-def sample(points: Array, n: int) -> Array:
-    """At most `n` of the points (N, 3), drawn at random, always the same ones, in their order.
+def sample(points: NDArray[Any], n: int) -> NDArray[Any]:
+    """At most `n` of the points (N, ...), drawn at random, always the same ones, in their order.
 
     Every k-th point would be a single ring of a cloud whose rings take turns in the file.
     """

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
@@ -13,39 +15,38 @@ from hybridreg.matches import Described
 
 Array = NDArray[np.float64]
 
-# Search radius of each step, spacings of the points: from what LGR's poses are off by to where neighbours cannot be
-# told apart. From 4 to 1 metre or 6 to 0.8, in 8 or 12 steps, made no difference on `sim:val`, 150 pairs.
-_RADII = tuple(np.geomspace(4.0, 1.0, 8))
 # Nearest candidates whose features are compared: all within the last radius, for speed; by hand.
 _CANDIDATES = 16
 # Of the softmax over the candidates' cosines; as in the votes for superpoint pairs (docs/methods.md 10.4).
 _TEMPERATURE = 0.05
-# Power of the cosine in a match's weight; by hand.
+# Power of the cosine in a match's weight; 8 and 16 on `sim:val`, 200 pairs, as good.
 _SHARPNESS = 4
 # Fewest matches that move the pose; by hand.
 _FEWEST = 10
 
 
-def guided_pose(T_target_source: Array, source: Described, target: Described, spacing: float) -> Array:
-    """The pose (4, 4) after eight rounds: match within a shrinking radius, fit.
+def guided_pose(
+    T_target_source: Array, source: Described, target: Described, radii: Sequence[float]
+) -> Array:
+    """The pose (4, 4) after a round for each radius: match within it, fit.
 
     Each point of either cloud is matched with the most similar of its nearest points in the other. A match weighs
-    more the more similar its features are, the less similar the other candidates', and the nearer it is. A round with
-    fewer than ten matches ends the search.
+    more the more similar its features are, the less similar the other candidates', and the nearer it is (Tukey's
+    biweight). A round with fewer than ten matches ends the search.
 
     Parameters
     ----------
     T_target_source : (4, 4)
-        From which to start, off by a few spacings at most.
+        From which to start.
     source, target : Described
-    spacing : float
-        Typical distance of the points, metres.
+    radii : of float
+        Metres, shrinking: the first is what the start may be off by.
     """
     T = T_target_source
     if not len(source.points) or not len(target.points):
         return T
     tree = cKDTree(target.points)
-    for radius in spacing * np.asarray(_RADII):
+    for radius in radii:
         moved = se3.apply(T, source.points)
         there, weight_there = _matched(moved, source.features, tree, target.features, radius)
         back, weight_back = _matched(target.points, target.features, cKDTree(moved), source.features, radius)
@@ -75,6 +76,6 @@ def _matched(
     row = np.arange(len(points))
     highest = cosine[row, best]
     among = (np.exp((cosine - highest[:, None]) / _TEMPERATURE) * within).sum(axis=1)
-    closeness = 1.0 - (distance[row, best] / radius) ** 2
-    weight = np.maximum(highest, 0.0) ** _SHARPNESS * np.maximum(closeness, 0.0) / np.maximum(among, 1.0)
+    closeness = np.maximum(1.0 - (distance[row, best] / radius) ** 2, 0.0) ** 2
+    weight = np.maximum(highest, 0.0) ** _SHARPNESS * closeness / np.maximum(among, 1.0)
     return near[row, best], np.where(within[row, best], weight, 0.0)

@@ -52,8 +52,9 @@ class Lgr(Stage):
     rival_share : float in [0, 1]
         A pose far from the best one is a rival when its support is at least this share of the best one's.
     guided : bool
-        Once LGR has a pose, match all points anew near where it puts them, which GeoTransformer does not
-        (`hybridreg.learned.matching.guided_matching`). Needs a matcher that hands on its features.
+        Ours: match all points anew near where LGR's pose puts them, and near where three poses of upright clouds do
+        that all similar points vote for; the one that these support most goes on
+        (`hybridreg.learned.matching.guided_search`). Needs a matcher that hands on its features.
     """
 
     max_distance: float | None = None
@@ -84,24 +85,24 @@ class Lgr(Stage):
         import torch  # noqa: F401  (`single` holds what is loaded)
 
         rows = _usable(matches)
-        if len(rows) < 3:
-            return Pose.unknown(len(matches))
         config = self.config(matches.spacing or 2.0 * scene.spacing)
-        max_distance = config.acceptance_radius
         with single():
-            found = _estimate(scene, matches, rows, config)
-            T: Array = found.transform.numpy()
-            if self.guided:
-                T = _guided(scene, matches, T)
+            found = None if len(rows) < 3 else _estimate(scene, matches, rows, config)
+            start = np.empty((0, 4, 4)) if found is None else found.transform.numpy()[None]
+            T = _guided(scene, matches, start) if self.guided else next(iter(start), None)
+            if T is None:
+                return Pose.unknown(len(matches))
             residual = np.linalg.norm(se3.apply(T, matches.source[rows]) - matches.target[rows], axis=1)
             inliers = np.zeros(len(matches), dtype=bool)
-            inliers[rows] = residual < max_distance
+            inliers[rows] = residual < config.acceptance_radius
             _, status = kabsch(matches.source[inliers], matches.target[inliers], matches.weight[inliers])
-            if status in ("few", "nan"):
+            if status in ("few", "nan") and not self.guided:
                 return Pose.unknown(len(matches))
             if status == "degenerate":
                 scene.note("the matches that agree lie on one line: the rotation about it is arbitrary")
-            rivals = self._rivals(matches, rows, T, found.proposals.numpy(), max_distance)
+            if found is None:
+                return Pose(T, inliers=inliers)
+            rivals = self._rivals(matches, rows, T, found.proposals.numpy(), config.acceptance_radius)
         return Pose(T, inliers=inliers, rivals=rivals)
 
     def config(self, spacing: float) -> LgrConfig:
@@ -134,15 +135,15 @@ class Lgr(Stage):
         return far[~same(far, T, np.median(source, axis=0), consensus)]
 
 
-def _guided(scene: Scene, matches: Correspondences, T: Array) -> Array:
-    from hybridreg.learned.matching.guided_matching import guided_pose
+def _guided(scene: Scene, matches: Correspondences, start: Array) -> Array | None:
+    from hybridreg.learned.matching.guided_search import search
 
     if matches.described is None:
         raise ValueError(
             f"pair {scene.pair.id}: guided matching compares features of all points, and this match stage hands on "
             "none; use geotransformer or vgam, or guided = false"
         )
-    return guided_pose(T, *matches.described, matches.spacing or scene.spacing)
+    return search(start, *matches.described, matches.spacing or scene.spacing)
 
 
 def _usable(matches: Correspondences) -> Rows:

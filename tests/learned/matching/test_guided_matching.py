@@ -10,6 +10,8 @@ from hybridreg.geometry import se3
 from hybridreg.learned.matching.guided_matching import guided_pose
 from hybridreg.matches import Described
 
+SPACING = 0.8
+RADII = SPACING * np.geomspace(4.0, 1.0, 8)
 TRUE = se3.from_rt(se3.rotation_about(np.array([0.02, -0.03, 0.9])), np.array([3.0, -2.0, 0.4]))
 
 
@@ -34,7 +36,7 @@ def off_by(T: np.ndarray, metres: float, degrees: float, seed: int) -> np.ndarra
 def test_a_pose_that_is_nearly_right_is_made_right(seed: int) -> None:
     source, target = seen(2 * seed, np.eye(4)), seen(2 * seed + 1, TRUE)
     start = off_by(TRUE, 1.5, 5.0, seed)
-    found = guided_pose(start, source, target, spacing=0.8)
+    found = guided_pose(start, source, target, RADII)
     step = found @ se3.inverse(TRUE)
     middle = se3.apply(TRUE, np.zeros((1, 3)))[0]
     assert np.linalg.norm(se3.apply(step, middle[None])[0] - middle) < 0.1
@@ -43,22 +45,22 @@ def test_a_pose_that_is_nearly_right_is_made_right(seed: int) -> None:
 
 def test_a_right_pose_stays() -> None:
     source, target = seen(20, np.eye(4)), seen(21, TRUE)
-    step = guided_pose(TRUE, source, target, spacing=0.8) @ se3.inverse(TRUE)
+    step = guided_pose(TRUE, source, target, RADII) @ se3.inverse(TRUE)
     assert se3.angle_deg(step[:3, :3]) < 0.3
 
 
 def test_where_nothing_is_near_the_pose_stays_as_it_is() -> None:
     source, target = seen(30, np.eye(4)), seen(31, TRUE)
     away = off_by(TRUE, 500.0, 0.0, 0)
-    assert np.array_equal(guided_pose(away, source, target, spacing=0.8), away)
+    assert np.array_equal(guided_pose(away, source, target, RADII), away)
 
 
 @pytest.mark.parametrize("points", [0, 1, 3])
 def test_a_few_points_move_nothing(points: int) -> None:
     source, target = seen(40, np.eye(4)), seen(41, TRUE)
     few = Described(source.points[:points], source.features[:points])
-    assert np.isfinite(guided_pose(TRUE, few, few, spacing=0.8)).all()
-    assert np.isfinite(guided_pose(TRUE, few, target, spacing=0.8)).all()
+    assert np.isfinite(guided_pose(TRUE, few, few, RADII)).all()
+    assert np.isfinite(guided_pose(TRUE, few, target, RADII)).all()
 
 
 def test_features_decide_not_distance() -> None:
@@ -66,7 +68,7 @@ def test_features_decide_not_distance() -> None:
     source, target = seen(50, np.eye(4)), seen(51, TRUE)
     start = off_by(TRUE, 1.5, 5.0, 1)
     shuffled = Described(target.points, np.random.default_rng(0).permutation(target.features))
-    right, wrong = (guided_pose(start, source, other, spacing=0.8) for other in (target, shuffled))
+    right, wrong = (guided_pose(start, source, other, RADII) for other in (target, shuffled))
     middle = np.zeros((1, 3))
     there = se3.apply(TRUE, middle)
     errors = [np.linalg.norm(se3.apply(T, middle) - there) for T in (right, wrong)]
