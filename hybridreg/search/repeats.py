@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from hybridreg.evidence.views import Views
@@ -51,10 +50,8 @@ def copies(views: Views, T_target_source: Array, axes: Array) -> list[Array]:
     near = np.abs(others).max(axis=1) < np.linalg.norm(arms, axis=1).max() + 2 * reach * cell
     if not near.any():
         return []
-    held, origin = _grid(others[near], cell, reach)
-    met = np.stack(
-        [_met(_turned(arms, axes[0], deg) @ frame.T, held, origin, cell, reach) for deg in _TURNS_DEG]
-    )
+    held = _Cells(others[near], cell)
+    met = np.stack([held.met(_turned(arms, axes[0], deg) @ frame.T, reach) for deg in _TURNS_DEG])
     best, turn = met.max(axis=0), met.argmax(axis=0)
     peaks = _peaks(best, max(_SHARE * best[reach, reach], 0.5 * _FEWEST))
     poses = []
@@ -81,23 +78,34 @@ def _turned(arms: Array, axis: Array, degrees: float) -> Array:
     return arms @ se3.rotation_about(np.radians(degrees) * axis).T
 
 
-def _grid(points: Array, cell: float, margin: int) -> tuple[NDArray[np.bool_], NDArray[np.int64]]:
-    # Cells that hold a point, with an empty margin, and the cell of the first one.
-    cells = np.floor(points / cell).astype(np.int64)
-    origin = cells.min(axis=0) - margin - 1
-    x, y, z = cells.max(axis=0) - origin + margin + 2
-    held = np.zeros((z, x, y), dtype=bool).transpose(1, 2, 0)  # what is looked up together lies together
-    held[tuple((cells - origin).T)] = True
-    return held, origin
+class _Cells:
+    # The cells (C, 3) that hold a point, sorted by their keys: a full grid of a sparse cloud would take gigabytes.
 
+    def __init__(self, points: Array, cell: float) -> None:
+        cells = np.floor(points / cell).astype(np.int64)
+        self._cell, self._origin = cell, cells.min(axis=0)
+        self._size = cells.max(axis=0) - self._origin + 1
+        self._keys = np.unique(self._key((cells - self._origin).T))
 
-def _met(
-    arms: Array, held: NDArray[np.bool_], origin: NDArray[np.int64], cell: float, reach: int
-) -> NDArray[np.int64]:
-    # How many points (n, 3) fall into held cells under each shift: (2 reach + 1, 2 reach + 1).
-    cells = np.floor(arms / cell).astype(np.int64) - origin
-    inside = ((cells >= reach) & (cells < np.array(held.shape) - reach)).all(axis=1)
-    i, j, k = cells[inside].T
-    around = sliding_window_view(held, (2 * reach + 1, 2 * reach + 1), axis=(0, 1))
-    hits: NDArray[np.int64] = around[i - reach, j - reach, k].sum(axis=0)
-    return hits
+    def _key(self, cells: NDArray[np.int64]) -> NDArray[np.int64]:
+        i, j, k = cells
+        return (k * self._size[0] + i) * self._size[1] + j
+
+    def met(self, points: Array, reach: int) -> NDArray[np.int64]:
+        """How many of the points (n, 3) fall into these cells under each shift: (2 reach + 1, 2 reach + 1)."""
+        across, along, height = (np.floor(points / self._cell).astype(np.int64) - self._origin).T
+        shift = np.arange(-reach, reach + 1)
+        # Cells of one row follow one another among the keys: one stretch for each point and shift across.
+        row = across[:, None] + shift
+        point, turn = np.nonzero(
+            (row >= 0) & (row < self._size[0]) & ((height >= 0) & (height < self._size[2]))[:, None]
+        )
+        i, j, k = row[point, turn], along[point], height[point]
+        lowest, highest = np.maximum(j - reach, 0), np.minimum(j + reach, self._size[1] - 1)
+        start = np.searchsorted(self._keys, self._key(np.array([i, lowest, k])))
+        end = np.searchsorted(self._keys, self._key(np.array([i, highest, k])), side="right")
+        many = np.maximum(np.where(lowest <= highest, end - start, 0), 0)
+        at = np.repeat(start - (np.cumsum(many) - many), many) + np.arange(many.sum())
+        column = self._keys[at] % self._size[1] - np.repeat(j, many) + reach
+        side = 2 * reach + 1
+        return np.bincount(np.repeat(turn, many) * side + column, minlength=side * side).reshape(side, side)

@@ -20,6 +20,8 @@ _YAWS = np.radians(np.arange(0.0, 360.0, 3.0))  # with 2 degrees no better, with
 # How far from the usual one the difference of two points' heights may be, spacings; 1.2 as good on `sim:val`.
 _BAND = 2.0
 _PEAKS = 3  # of one yaw; by hand
+# Shifts of more spacings, from middle to middle, get no votes: a stray point would ask for gigabytes of cells.
+_FARTHEST = 400
 # Two peaks nearer to each other than both are one, spacings and radians; by hand.
 _APART, _TURNED = 2.5, np.radians(8.0)
 
@@ -34,51 +36,58 @@ def upright_poses(pairs: SimilarPoints, spacing: float, most: int) -> Array:
         Typical distance of the points, metres: the side of a cell.
     most : int
     """
-    rise = pairs.target[:, 2] - pairs.source[:, 2]
-    if not len(rise):
+    if not len(pairs.weight):
         return np.empty((0, 4, 4))
+    rise = pairs.target[:, 2] - pairs.source[:, 2]
     height = _usual(rise, pairs.weight, spacing)
     level = np.abs(rise - height) < _BAND * spacing
-    source, target, weight = pairs.source[level, :2], pairs.target[level, :2], pairs.weight[level]
-    reach = np.linalg.norm(source, axis=1).max() + np.linalg.norm(target, axis=1).max() + spacing
-    side = int(2.0 * reach / spacing) + 1
-    peaks = np.concatenate([_peaks(yaw, source, target, weight, reach, side, spacing) for yaw in _YAWS])
+    source, target, weight = pairs.source[level], pairs.target[level], pairs.weight[level]
+    middle, there = np.median(source, axis=0), np.median(target, axis=0)
+    arms = (source - middle)[:, :2] / spacing, (target - there)[:, :2] / spacing
+    peaks = np.concatenate([_peaks(yaw, *arms, weight) for yaw in _YAWS])
     chosen: list[Array] = []
     for peak in peaks[np.argsort(-peaks[:, 0], kind="stable")]:
-        if all(_differ(peak, other, spacing) for other in chosen):
+        if all(_differ(peak, other) for other in chosen):
             chosen.append(peak)
         if len(chosen) == most:
             break
-    return np.array(
-        [
-            se3.from_rt(se3.rotation_about(np.array([0.0, 0.0, yaw])), np.array([x, y, height]))
-            for _, yaw, x, y in chosen
-        ]
-    )
+    moved = there - middle
+    poses = [
+        se3.about(
+            middle,
+            se3.rotation_about(np.array([0.0, 0.0, yaw])),
+            np.array([moved[0] + spacing * x, moved[1] + spacing * y, height]),
+        )
+        for _, yaw, x, y in chosen
+    ]
+    return np.array(poses).reshape(-1, 4, 4)
 
 
 def _usual(rise: Array, weight: Array, spacing: float) -> float:
-    # The middle of the two neighbouring bins that hold the most.
-    edges = np.arange(rise.min() - spacing, rise.max() + 2.0 * spacing, 0.5 * spacing)
-    held = np.histogram(rise, edges, weights=weight)[0]
-    return float(edges[np.argmax(held[:-1] + held[1:]) + 1])
+    # The middle of the two neighbouring bins, half a spacing each, that hold the most.
+    bins, at = np.unique(np.floor(rise / (0.5 * spacing)), return_inverse=True)
+    held = np.bincount(at, weight)
+    following = np.append(np.where(np.diff(bins) == 1.0, held[1:], 0.0), 0.0)
+    return float((bins[np.argmax(held + following)] + 1.0) * 0.5 * spacing)
 
 
-def _peaks(
-    yaw: float, source: Array, target: Array, weight: Array, reach: float, side: int, spacing: float
-) -> Array:
+def _peaks(yaw: float, source: Array, target: Array, weight: Array) -> Array:
     # Rows of votes, yaw and shift of the best corners of cells; what four cells that meet there hold is its votes.
     cosine, sine = np.cos(yaw), np.sin(yaw)
     shift = target - source @ np.array([[cosine, sine], [-sine, cosine]])
-    cell = ((shift + reach) / spacing).astype(np.int64)
-    held = np.bincount(cell[:, 0] * side + cell[:, 1], weight, side * side).reshape(side, side)
+    reach = min(int(np.abs(shift).max()) + 2, _FARTHEST)
+    cell = np.floor(shift).astype(np.int64) + reach
+    side = 2 * reach
+    inside = ((cell >= 0) & (cell < side)).all(axis=1)
+    row, column = cell[inside].T
+    held = np.bincount(row * side + column, weight[inside], side * side).reshape(side, side)
     votes = held[:-1, :-1] + held[1:, :-1] + held[:-1, 1:] + held[1:, 1:]
     best = np.argpartition(-votes, _PEAKS, axis=None)[:_PEAKS]
     row, column = np.divmod(best, side - 1)
-    corner = np.stack([row + 1, column + 1], axis=1) * spacing - reach
+    corner = np.stack([row, column], axis=1) + 1 - reach
     return np.column_stack([votes[row, column], np.full(len(best), yaw), corner])
 
 
-def _differ(one: Array, other: Array, spacing: float) -> bool:
+def _differ(one: Array, other: Array) -> bool:
     turn = abs((one[1] - other[1] + np.pi) % (2.0 * np.pi) - np.pi)
-    return bool(turn > _TURNED or np.linalg.norm(one[2:] - other[2:]) > _APART * spacing)
+    return bool(turn > _TURNED or np.linalg.norm(one[2:] - other[2:]) > _APART)

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import tracemalloc
+
 import numpy as np
 import pytest
 
@@ -113,3 +115,17 @@ def test_peaks_of_the_votes_are_poses_apart_best_first() -> None:
     found = upright_poses(SimilarPoints(points, target, np.ones(300)), SPACING, 2)
     for T_found, T_made in zip(found, (T, other), strict=True):
         assert off(T_found, T_made) < 4.0
+
+
+def test_a_stray_point_costs_no_memory_and_a_far_frame_no_pose() -> None:
+    T, far = pose(30.0, (4.0, 2.0, 0.2)), np.array([5.0e5, 4.0e6, 300.0])
+    source = np.random.default_rng(13).uniform(-20.0, 20.0, (300, 3)) * [1.0, 1.0, 0.1]
+    target = se3.apply(T, source) + far
+    source[0] += [0.0, 3.0e5, 0.0]
+    pairs = SimilarPoints(source, target, np.ones(300))
+    tracemalloc.start()
+    found = upright_poses(pairs, SPACING, 1)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert off(se3.from_rt(np.eye(3), -far) @ found[0], T) < 4.0
+    assert peak < 50e6
