@@ -94,7 +94,7 @@ def _level(name: str) -> int:
     return LEVEL["verdict.training"] if name.startswith("verdict.training") else LEVEL[name.split(".")[0]]
 
 
-def test_nobody_looks_up() -> None:
+def test_no_module_imports_from_a_layer_above() -> None:
     up = [
         f"{name} imports {other}"
         for name, all_ in IMPORTS.items()

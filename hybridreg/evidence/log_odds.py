@@ -19,9 +19,9 @@ from hybridreg.geometry.ground_relief import nats
 
 Array = NDArray[np.float64]
 
-# Probability from which a pose is "ok": by hand.
-OK = 0.95
-# Log-odds of that.
+# Probability from which a pose is "ok", by hand, and below which it is "failed": more likely wrong than right.
+OK, FAILED = 0.95, 0.5
+# Log-odds from which it is "ok".
 NEARLY = float(np.log(OK / (1.0 - OK)))
 # Information per point below which a direction is open, however little there is: by hand.
 _UNHELD = 1e-4

@@ -17,13 +17,11 @@ from typing import Literal
 import numpy as np
 
 from hybridreg.evidence.evidence import NO_RIVAL, Evidence
-from hybridreg.evidence.log_odds import NEARLY, OK
+from hybridreg.evidence.log_odds import FAILED, NEARLY, OK
 from hybridreg.verdict.boosted import Boosted
 
 Word = Literal["ok", "doubtful", "failed"]
 
-# Probability below which a pose is "failed": it is more likely wrong than right.
-FAILED = 0.5
 # Probability of a pose that turns the world upside down, at most: by hand.
 _OVERTURNED = 0.3
 # Probability of a pose that some rule leaves in doubt (docs/methods.md 12.7), at most: by hand.

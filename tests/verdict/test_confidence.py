@@ -9,9 +9,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hybridreg.evidence.evidence import NO_RIVAL, Evidence
-from hybridreg.evidence.log_odds import NEARLY, OK, beside, log_odds, model, terms
+from hybridreg.evidence.log_odds import FAILED, NEARLY, OK, beside, log_odds, model, terms
 from hybridreg.verdict.boosted import Boosted
-from hybridreg.verdict.confidence import FAILED, SPEAKS, believed, confidence, features, trees, word
+from hybridreg.verdict.confidence import SPEAKS, believed, confidence, features, trees, word
 from hybridreg.verdict.training.boosting import boost, plain
 
 share = st.floats(0.0, 1.0)
