@@ -30,6 +30,7 @@ from hybridreg.data.simulate.sensing.scan import scan
 from hybridreg.data.simulate.sensing.stands import single_stand
 from hybridreg.data.simulate.world.carriers import Carrier
 from hybridreg.data.simulate.world.mesh import EMPTY
+from hybridreg.geometry import se3
 
 RANGE_EDGES = (0, 5, 10, 20, 30, 50, 500)
 ROOT = Path(__file__).resolve().parent.parent
@@ -44,6 +45,7 @@ class Match:
     scenes: tuple[str, ...]
     height: float  # of the real sensor over the ground, metres
     places: int  # where the clouds were recorded
+    forward: bool = False  # looks along the road: of eight headings the one that sees farthest
 
 
 MATCHES = (
@@ -58,6 +60,8 @@ MATCHES = (
     Match("vlp32c", ("av2-7fab-up-to-down/source", "av2-7fab-up-to-down/target", "rellis-vlp32-to-os64/source"),
           ("street", "street", "park"), 1.9, 2),
     Match("hdl32e", ("hdl32-small-gicp/source", "hdl32-small-gicp/target"), ("street", "campus"), 1.9, 1),
+    Match("pandargt", ("pandaset-001-gt-to-p64/source", "pandaset-002-gt-to-p64/source",
+                       "pandaset-002-gt60-to-p64-00/source"), ("street", "street", "campus"), 1.86, 2, forward=True),
     Match("os1-64", ("rellis-vlp32-to-os64/target",), ("park", "woods"), 1.55, 1),
 )  # fmt: skip
 
@@ -129,9 +133,18 @@ def simulated_clouds(match: Match, n: int) -> Iterator[np.ndarray]:
         layout = SCENES[match.scenes[k % len(match.scenes)]](rng)
         # No body under the sensor: its points are left out of the figures, and real mounts clear their roofs.
         stand = single_stand(layout, rng, Carrier(EMPTY, match.height, 1.6))
-        yield scan(
-            world_with(layout, stand), layout.surface, SENSORS[match.sensor], stand.T_world_sensor, rng
-        )
+        headings = range(0, 360, 45) if match.forward else (0,)
+        clouds = [
+            scan(
+                world_with(layout, stand),
+                layout.surface,
+                SENSORS[match.sensor],
+                stand.T_world_sensor @ se3.yaw(heading),
+                rng,
+            )
+            for heading in headings
+        ]
+        yield max(clouds, key=lambda cloud: float(np.median(np.linalg.norm(cloud, axis=1))))
 
 
 Figures = list[dict[str, float]]

@@ -53,6 +53,17 @@ def test_raster_is_dense_about_the_horizon() -> None:
     assert centre > 2 * rim
 
 
+def test_rows_are_evenly_spaced_and_look_down() -> None:
+    """As three clouds of PandaSet's PandarGT: 15 degrees below the horizon to 5.5 above, 0.15 to 0.16 between rows."""
+    azimuth, elevation = angles("pandargt")
+    ahead = np.sort(elevation[np.abs(azimuth) < 0.05])  # one column
+    assert elevation.min() == pytest.approx(-15.4, abs=0.6)
+    assert elevation.max() == pytest.approx(5.4, abs=0.6)
+    below, above = (np.diff(ahead[part]).mean() for part in (ahead < -5.0, ahead > -5.0))
+    assert below == pytest.approx(0.16, abs=0.01)
+    assert above == pytest.approx(below, abs=0.01)
+
+
 def test_rosette_never_repeats_and_the_others_keep_their_lines() -> None:
     one, other = (pattern(SENSORS["rosette"], np.random.default_rng(s)) for s in (1, 2))
     assert np.degrees(np.arccos(np.clip((one * other).sum(1), -1, 1))).max() > 10

@@ -75,11 +75,31 @@ def raster(sensor: Sensor, rng: np.random.Generator) -> np.ndarray:
     return _directions(azimuth[None] + shift, elevation[:, None])
 
 
+def rows(sensor: Sensor, rng: np.random.Generator) -> np.ndarray:
+    """Three modules side by side that scan evenly spaced rows in step; as three clouds of PandaSet's PandarGT show."""
+    modules = 3
+    wide, high = np.radians(sensor.fov_deg)
+    columns = round(np.sqrt(sensor.points * wide / high) / modules)
+    lines = sensor.points // (modules * columns)
+    part = wide / modules
+    along = np.linspace(-0.5, 0.5, columns)
+    up = np.radians(sensor.middle_deg) + 0.5 * high * np.linspace(1, -1, lines)
+    parts = []
+    for k in range(modules):
+        across = (k - 1) * part + 1.01 * part * along[None, :]
+        # Rows of one module slope by a degree and bow by less, as its mirror turns.
+        parts.append(
+            _directions(across, up[:, None] + 0.017 * along[None, :] + rng.normal(0, 0.0005, lines)[:, None])
+        )
+    return np.concatenate([one.T for one in parts], axis=1).T
+
+
 PATTERNS: dict[str, Callable[[Sensor, np.random.Generator], np.ndarray]] = {
     "spinning": spinning,
     "fan": fan,
     "rosette": rosette,
     "raster": raster,
+    "rows": rows,
 }
 
 

@@ -13,13 +13,14 @@ class Sensor:
     """Geometry and ranging of one model; elevations and rates follow the makers' data sheets."""
 
     name: str
-    kind: str  # "spinning", "fan", "rosette" or "raster": one of patterns.PATTERNS
+    kind: str  # "spinning", "fan", "rosette", "raster" or "rows": one of patterns.PATTERNS
     points: int  # pulses per scan
     fov_deg: tuple[float, float] = (
         360.0,
         0.0,
     )  # across and up; up follows from `elevations_deg` when spinning
     elevations_deg: tuple[float, ...] = ()  # one per beam, spinning sensors only
+    middle_deg: float = 0.0  # elevation of the middle of the field of view, "rows" only
     range_min: float = 0.5  # blind zone, metres
     range_max: float = 120.0
     range_10: float = 60.0  # where half the pulses return from a 10 % target at right angles
@@ -66,6 +67,9 @@ SENSORS = {
                range_max=200, noise_m=0.015, divergence_mrad=3.5),
         Sensor(name="raster", kind="raster", fov_deg=(60.0, 20.0), points=60_000, range_min=1.0, range_10=120,
                range_max=200, noise_m=0.02, noise_growth=0.0003, divergence_mrad=2.0),
+        # Not among SOURCE_SENSORS: the tiers were frozen before its pattern was read off real clouds.
+        Sensor(name="pandargt", kind="rows", fov_deg=(61.5, 20.6), middle_deg=-5.0, points=130 * 570, range_min=1.0,
+               range_10=120, range_max=300, noise_m=0.02, noise_growth=0.0003, divergence_mrad=2.0),
     )
 }  # fmt: skip
 SOURCE_SENSORS = {"mems-fan": 0.5, "rosette": 0.25, "raster": 0.25}
