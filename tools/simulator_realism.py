@@ -48,6 +48,9 @@ class Match:
     forward: bool = False  # looks along the road: of eight headings the one that sees farthest
 
 
+PANDARGT = tuple(
+    f"pandaset-{name}/source" for name in ("001-gt-to-p64", "002-gt-to-p64", "002-gt60-to-p64-00")
+)
 MATCHES = (
     Match("hdl64e", ("kitti-city-20-to-0/source", "kitti-city-20-to-0/target", "kitti-odo-5-to-0/source",
                      "frames/kitti-object-000000/cloud", "frames/kitti-object-000001/cloud"),
@@ -60,8 +63,9 @@ MATCHES = (
     Match("vlp32c", ("av2-7fab-up-to-down/source", "av2-7fab-up-to-down/target", "rellis-vlp32-to-os64/source"),
           ("street", "street", "park"), 1.9, 2),
     Match("hdl32e", ("hdl32-small-gicp/source", "hdl32-small-gicp/target"), ("street", "campus"), 1.9, 1),
-    Match("pandargt", ("pandaset-001-gt-to-p64/source", "pandaset-002-gt-to-p64/source",
-                       "pandaset-002-gt60-to-p64-00/source"), ("street", "street", "campus"), 1.86, 2, forward=True),
+    Match("pandargt", PANDARGT, ("street", "street", "campus"), 1.86, 2, forward=True),
+    # The sensor of the frozen tiers, which was made before any cloud of a real one was at hand.
+    Match("raster", PANDARGT, ("street", "street", "campus"), 1.86, 2, forward=True),
     Match("os1-64", ("rellis-vlp32-to-os64/target",), ("park", "woods"), 1.55, 1),
 )  # fmt: skip
 
