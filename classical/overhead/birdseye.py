@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from hybridreg.classical.overhead.overhead_columns import FromAbove, from_above
 from hybridreg.classical.overhead.planar_climb import climb
 from hybridreg.classical.overhead.sweep import sweep
-from hybridreg.evidence.log_odds import NEARLY
+from hybridreg.evidence.log_odds import OK_LOG_ODDS
 from hybridreg.geometry import se3
 from hybridreg.geometry.ground import Ground
 from hybridreg.matches import Correspondences, Pose
@@ -105,7 +105,7 @@ class BirdsEye(Stage):
         found: list[Hypothesis] = []
         for frames in self._levelled(own, scene):
             found = best([*found, *self._laid(scene, own, frames, voxel)])
-            if found and found[0].log_odds >= NEARLY:
+            if found and found[0].log_odds >= OK_LOG_ODDS:
                 break
         if not found:
             scene.note("bird's-eye search: nothing but ground")
@@ -134,7 +134,7 @@ class BirdsEye(Stage):
         if len(source.filled.layer) == 0 or len(target.filled.layer) == 0:
             return []
         found = self._searched(scene, source, target, voxel, frames)
-        if not self.again or not found or not NEARLY <= found[0].log_odds < BEYOND_DOUBT:
+        if not self.again or not found or not OK_LOG_ODDS <= found[0].log_odds < BEYOND_DOUBT:
             return found
         # A street looks alike from its other end and farther along: what could be mistaken for the pose must be known.
         T_level_source = _centred(T_level_target @ found[0].T, own.source.centre)
@@ -147,7 +147,7 @@ class BirdsEye(Stage):
         found: list[Hypothesis] = []
         for levelled in _LEVELLED[: None if self.again else 1]:
             poses = _unlevelled(self._planar(source, target, voxel, levelled), frames)
-            for some, plain in ((poses[:_FIRST], BEYOND_DOUBT), (poses[_FIRST:], NEARLY)):
+            for some, plain in ((poses[:_FIRST], BEYOND_DOUBT), (poses[_FIRST:], OK_LOG_ODDS)):
                 found = best([*found, *best_first(scene, some)])
                 if found and found[0].log_odds >= plain:
                     return found

@@ -13,14 +13,14 @@ from numpy.typing import NDArray
 
 from hybridreg import fitting, registry, spec
 from hybridreg.candidates import input_mistakes, shut_out
-from hybridreg.evidence.log_odds import NEARLY, OK
+from hybridreg.evidence.log_odds import OK, OK_LOG_ODDS
 from hybridreg.evidence.pose_evidence import PoseEvidence
 from hybridreg.io.shipped_weights import MissingWeights
 from hybridreg.matches import Correspondences, EntryTrace, Overlap, Pose
 from hybridreg.resolution import comparable, size_ratio
 from hybridreg.scene import Scene
 from hybridreg.search.hypothesis import Hypothesis, as_hypotheses, as_pose
-from hybridreg.search.ranking import HOPELESS, counted, distinct
+from hybridreg.search.ranking import HOPELESS, best, counted, distinct, with_matches
 from hybridreg.search.settle import best_first, second_look
 from hybridreg.stage import Stage
 from hybridreg.verdict import weigh
@@ -182,9 +182,12 @@ class Candidates(Stage):
             yield found
 
     def _joined(self, scene: Scene, found: list[Hypothesis], offered: list[Hypothesis]) -> list[Hypothesis]:
+        # Likeliest by the same measure: those before have their matches, but also a closeness beside one another.
+        found = [one.but(closeness=0.0) for one in found]
+        offered = best(with_matches(scene, one) for one in offered)
         highest = max(one.log_odds for one in [*found, *offered])
         # Refining a wrong pose costs most: nothing there lets it rest, and what is nearest is far away.
-        near = [one for one in offered if one.log_odds > max(highest - NEARLY, _UNREFINED)][:_REFINED]
+        near = [one for one in offered if one.log_odds > max(highest - OK_LOG_ODDS, _UNREFINED)][:_REFINED]
         refined = [self._refined(scene, one) for one in near]
         return distinct(scene, [*found, *refined, *offered[len(near) :]])
 
@@ -194,7 +197,8 @@ class Candidates(Stage):
         # Along a corridor a refinement may slide away; else it is nearer than what settled, however likely that is.
         if moved.by_surfaces <= settled.by_surfaces - _NOISE or np.array_equal(moved.T, settled.T):
             return settled
-        return Hypothesis(at=moved, by_surfaces=moved.by_surfaces, came_from=settled.came_from)
+        refined = Hypothesis(at=moved, by_surfaces=moved.by_surfaces, came_from=settled.came_from)
+        return with_matches(scene, refined)
 
 
 # What the second look at all that was tried is called among the entries.

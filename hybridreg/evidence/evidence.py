@@ -21,7 +21,8 @@ NO_RIVAL = -20.0
 class Evidence:
     """What both clouds say about one pose; shares lie between 0 and 1.
 
-    The first group is what the log-odds weigh (`hybridreg.evidence.log_odds`), the second what the verdict adds.
+    The first group is known of every hypothesis; most of it is weighed by the log-odds (`hybridreg.evidence.log_odds`).
+    The second is computed for the pose that is judged: some for the verdict, some only to be reported.
     """
 
     agreement_least: float  # agreeing share of the visible points that face the axis on which it is least

@@ -22,7 +22,7 @@ Array = NDArray[np.float64]
 # Probability from which a pose is "ok", by hand, and below which it is "failed": more likely wrong than right.
 OK, FAILED = 0.95, 0.5
 # Log-odds from which it is "ok".
-NEARLY = float(np.log(OK / (1.0 - OK)))
+OK_LOG_ODDS = float(np.log(OK / (1.0 - OK)))
 # Information per point below which a direction is open, however little there is: by hand.
 _UNHELD = 1e-4
 # A share below this is as good as none: by hand.
@@ -44,7 +44,7 @@ class Model(NamedTuple):
 
 @lru_cache(maxsize=1)
 def model() -> Model:
-    """The rule in `log_odds.json`, which `python -m hybridreg.verdict.training` fits."""
+    """The rule in `log_odds.json`, which `python -m hybridreg.verdict.training fit` fits."""
     stored = json.loads(files("hybridreg.evidence").joinpath("log_odds.json").read_text())
     return Model(stored["weights"], stored["intercept"])
 
@@ -70,7 +70,6 @@ def terms(evidence: Evidence) -> dict[str, float]:
         "log_agreement_least": float(np.log(evidence.agreement_least + _NOTHING)),
         "looked_through": evidence.looked_through,
         "looked_through_less": min(evidence.looked_through_source, evidence.looked_through_target),
-        "agreement_rare": evidence.agreement_rare,
         "looked_through_rare": evidence.looked_through_rare,
         "log_agreed_rare": float(np.log1p(evidence.agreed_rare)),
         "log_through_rare": float(np.log1p(evidence.through_rare)),
@@ -96,8 +95,3 @@ def of_each(views: Views, poses: Array, stride: int = 1) -> list[float]:
         for first in range(0, len(poses), some)
         for agreement in compare_each(views, poses[first : first + some], stride)
     ]
-
-
-def of(views: Views, T_target_source: Array, stride: int = 1) -> float:
-    """The same for one pose (4, 4)."""
-    return of_each(views, T_target_source[None], stride)[0]

@@ -109,7 +109,7 @@ class FineSurfaces(NamedTuple):
         return cls(*side_by_side(lambda cloud: _surfaces(cloud, scale), *clouds))
 
 
-def closeness(fine: FineSurfaces, T_target_source: Array, stride: int = 1) -> float:
+def closeness(fine: FineSurfaces, T_target_source: Array) -> float:
     """Nats per point by which the pose explains the distances to the surfaces better than chance does.
 
     The log-likelihood of points with a partner near by under a mixture (on the surface but for noise, or anywhere near)
@@ -119,14 +119,12 @@ def closeness(fine: FineSurfaces, T_target_source: Array, stride: int = 1) -> fl
     ----------
     T_target_source : (4, 4)
         A pose, or one with a size.
-    stride : int
-        Every so many-th of the sampled points counts.
     """
     source, target = fine
     back: Array = np.linalg.inv(T_target_source).astype(np.float64)  # of a pose with a size too
     return max(
-        _one_way(source.asked[::stride], target, T_target_source),
-        _one_way(target.asked[::stride], source, back),
+        _one_way(source.asked, target, T_target_source),
+        _one_way(target.asked, source, back),
     )
 
 

@@ -75,13 +75,12 @@ class _Sides:
         axis = np.abs(facing).argmax(axis=1)
         self.side = 2 * axis + (facing[np.arange(len(rows)), axis] > 0.0)
         self.along = view.points[rows] @ axes.T
-        self.low, high = np.quantile(self.along, [_ENDS, 1.0 - _ENDS], axis=0)
-        self.extent = float((high - self.low).max())
+        self.low, self.high = np.quantile(self.along, [_ENDS, 1.0 - _ENDS], axis=0)
+        self.extent = float((self.high - self.low).max())
 
     def grid(self, cell: float) -> NDArray[np.float32]:
         held = np.zeros((6, _CELLS, _CELLS, _CELLS), dtype=np.float32)
-        at = np.floor((self.along - self.low) / cell).astype(np.int64)
-        inside = ((at >= 0) & (at < _CELLS)).all(axis=1)
-        x, y, z = at[inside].T
+        inside = ((self.along >= self.low) & (self.along <= self.high)).all(axis=1)
+        x, y, z = np.floor((self.along[inside] - self.low) / cell).astype(np.int64).T
         held[self.side[inside], x, y, z] = 1.0
         return held

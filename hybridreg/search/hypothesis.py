@@ -29,7 +29,7 @@ class Hypothesis:
     by_surfaces : float
         Log-odds that it is right by the surfaces alone, perhaps from some of the sampled points.
     settled : bool
-        It rests where the surfaces let it, and need not be settled again.
+        It rests where the surfaces let it, or is too far behind for that to matter: it need not be settled again.
     found_by : int
         Entries that found it independently of one another.
     matched : float
@@ -70,7 +70,7 @@ class Found:
     Attributes
     ----------
     starts : every start, roughly settled
-    settled : the best of these, settled closely, and what rests where it is
+    settled : the best of these, settled closely but for those far behind, and what rests where it is
     """
 
     starts: list[Hypothesis] = field(default_factory=list)

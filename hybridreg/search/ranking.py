@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybridreg.evidence import match_agreement, views
-from hybridreg.evidence.log_odds import NEARLY
+from hybridreg.evidence.log_odds import OK_LOG_ODDS
 from hybridreg.geometry import se3
 from hybridreg.scene import Scene
 from hybridreg.search.hypothesis import Hypothesis
@@ -24,7 +24,7 @@ _TURNED = 5.0
 # `sim:train`, hard kinds with even seeds) the right one never had less than -2.8.
 HOPELESS = -4.0
 # Log-odds from which a pose is beyond doubt: twice those of "ok".
-BEYOND_DOUBT = 2.0 * NEARLY
+BEYOND_DOUBT = 2.0 * OK_LOG_ODDS
 # Log-odds below the best pose's from which closeness no longer decides: by hand.
 _CONTENDS = 8.0
 
@@ -45,8 +45,13 @@ def distinct(scene: Scene, found: Iterable[Hypothesis]) -> list[Hypothesis]:
     return kept
 
 
+def with_matches(scene: Scene, one: Hypothesis) -> Hypothesis:
+    """The same pose by itself: with the share of the matches that agree with it, found once, closer than no other."""
+    return one.but(matched=match_agreement.share(scene, one.T), closeness=0.0, found_by=1)
+
+
 def counted(
-    scene: Scene, found: Iterable[Hypothesis], offered: Iterable[Iterable[Hypothesis]]
+    scene: Scene, found: Iterable[Hypothesis], offered: Sequence[Sequence[Hypothesis]]
 ) -> list[Hypothesis]:
     """The likeliest first, each with the number of entries that `offered` it, its matches and its closeness."""
     both = views.of(scene)
@@ -56,7 +61,7 @@ def counted(
         came = [
             any(not differs(other.T, one.T, centre, both.spacing) for other in entry) for entry in offered
         ]
-        return one.but(found_by=max(sum(came), 1), matched=match_agreement.share(scene, one.T), closeness=0.0)
+        return with_matches(scene, one).but(found_by=max(sum(came), 1))
 
     return best(told_apart([told(one) for one in found]))
 

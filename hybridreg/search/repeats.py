@@ -96,16 +96,16 @@ class _Cells:
         across, along, height = (np.floor(points / self._cell).astype(np.int64) - self._origin).T
         shift = np.arange(-reach, reach + 1)
         # Cells of one row follow one another among the keys: one stretch for each point and shift across.
-        row = across[:, None] + shift
-        point, turn = np.nonzero(
-            (row >= 0) & (row < self._size[0]) & ((height >= 0) & (height < self._size[2]))[:, None]
+        moved = across[:, None] + shift
+        point, nth = np.nonzero(
+            (moved >= 0) & (moved < self._size[0]) & ((height >= 0) & (height < self._size[2]))[:, None]
         )
-        i, j, k = row[point, turn], along[point], height[point]
+        i, j, k = moved[point, nth], along[point], height[point]
         lowest, highest = np.maximum(j - reach, 0), np.minimum(j + reach, self._size[1] - 1)
         start = np.searchsorted(self._keys, self._key(np.array([i, lowest, k])))
         end = np.searchsorted(self._keys, self._key(np.array([i, highest, k])), side="right")
-        many = np.maximum(np.where(lowest <= highest, end - start, 0), 0)
+        many = np.where(lowest <= highest, end - start, 0)
         at = np.repeat(start - (np.cumsum(many) - many), many) + np.arange(many.sum())
         column = self._keys[at] % self._size[1] - np.repeat(j, many) + reach
         side = 2 * reach + 1
-        return np.bincount(np.repeat(turn, many) * side + column, minlength=side * side).reshape(side, side)
+        return np.bincount(np.repeat(nth, many) * side + column, minlength=side * side).reshape(side, side)

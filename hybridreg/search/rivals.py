@@ -6,16 +6,15 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from hybridreg.evidence import match_agreement
 from hybridreg.evidence.pose_evidence import PoseEvidence
 from hybridreg.evidence.surface_distance import settle_closely
 from hybridreg.matches import Pose
 from hybridreg.scene import Scene
+from hybridreg.search import settle
 from hybridreg.search.axis_turns import TURNS, poses
 from hybridreg.search.hypothesis import Hypothesis, as_hypotheses, parted, seen_at
-from hybridreg.search.ranking import best, differs
+from hybridreg.search.ranking import best, differs, with_matches
 from hybridreg.search.repeats import copies
-from hybridreg.search.settle import settle
 
 Array = NDArray[np.float64]
 
@@ -42,24 +41,21 @@ def find(scene: Scene, own: PoseEvidence, pose: Pose) -> list[Hypothesis]:
     def is_rival(T: Array) -> bool:
         return differs(T, own.T, centre, views.spacing)
 
-    def with_matches(one: Hypothesis) -> Hypothesis:
-        return one.but(matched=match_agreement.share(scene, one.T), closeness=0.0, found_by=1)
-
     known, guesses = parted(as_hypotheses(pose)[1 : 1 + _OFFERED])
     turned = _turned(own)
     guesses += [*turned[_FULLEST:], *copies(views, own.T, own.agreement.axes)]
     promising = [*known, *seen_at(scene, [T for T in guesses if is_rival(T)], _QUICK)]
-    likeliest = best(with_matches(one) for one in promising if is_rival(one.T))[:_SETTLED]
+    likeliest = best(with_matches(scene, one) for one in promising if is_rival(one.T))[:_SETTLED]
     guessed = [one.T for one in likeliest if not one.settled]
     guessed += [T for T in turned[:_FULLEST] if is_rival(T)]
-    moved = seen_at(scene, settle(views, np.array(guessed).reshape(-1, 4, 4)), _CLOSE)
+    moved = seen_at(scene, settle.settle(views, np.array(guessed).reshape(-1, 4, 4)), _CLOSE)
     rivals = [*(one for one in likeliest if one.settled), *moved]
     # Guesses that come back to the pose are no rivals, and must not hide those behind them.
-    apart = best(with_matches(one) for one in rivals if is_rival(one.T))[:_ENOUGH]
+    apart = best(with_matches(scene, one) for one in rivals if is_rival(one.T))[:_ENOUGH]
 
     def came_to_rest(one: Hypothesis) -> bool:
         # Where surfaces hold a pose loosely, a rival may have stopped on its way to it.
-        far_behind = one.log_odds < own.by_surfaces - _CONTENDS
+        far_behind = one.by_surfaces < own.by_surfaces - _CONTENDS
         return far_behind or is_rival(settle_closely(views.fine, one.T))
 
     return [one for one in apart if came_to_rest(one)]

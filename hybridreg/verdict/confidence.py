@@ -17,7 +17,7 @@ from typing import Literal
 import numpy as np
 
 from hybridreg.evidence.evidence import NO_RIVAL, Evidence
-from hybridreg.evidence.log_odds import FAILED, NEARLY, OK
+from hybridreg.evidence.log_odds import FAILED, OK, OK_LOG_ODDS
 from hybridreg.verdict.boosted import Boosted
 
 Word = Literal["ok", "doubtful", "failed"]
@@ -85,10 +85,10 @@ def confidence(evidence: Evidence, rule: Boosted | None = None) -> float:
 
 
 def _one_of_two(told: Mapping[str, float], rule: Boosted) -> bool:
-    # Beyond doubt were it not for a rival that explains the clouds about as well: one of the two is right (of 103 such
+    # "ok" were it not for a rival that explains the clouds about as well: one of the two is right (of 103 such
     # training poses 37 were).
     alone = rule({**told, "rival_margin": NO_RIVAL})
-    return told["rival_margin"] < _EQUAL and alone >= NEARLY
+    return told["rival_margin"] < _EQUAL and alone >= OK_LOG_ODDS
 
 
 def believed(log_odds: float, rival_margin: float) -> float:

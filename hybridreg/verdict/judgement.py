@@ -97,7 +97,7 @@ class Judgement:
 
 
 def judge(scene: Scene, pose: Pose, matches: Correspondences) -> Judgement:
-    """Judge a pose between the levels' frames by what both clouds say about it.
+    """Judge a pose (source to target) by what both clouds say about it.
 
     The evidence is taken at a resolution of its own (`hybridreg.resolution.default_voxel`), so that it means the
     same whatever voxel the pipeline used. A pose that was not found is judged as what it is, a placeholder: failed.

@@ -32,7 +32,7 @@ def consistent(target: Tensor, source: Tensor, weight: Tensor, reach: float) -> 
     Returns
     -------
     Tensor
-        (C,) bool; all true where there are fewer than three.
+        (C,) bool; all true where there are fewer than three, or no two that could be right together.
     """
     keep = torch.zeros(len(weight), dtype=torch.bool, device=weight.device)
     if len(weight) < 3:

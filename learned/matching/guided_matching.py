@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 
 # Nearest candidates whose features are compared: all within the last radius, for speed; by hand.
 _CANDIDATES = 16
-# Of the softmax over the candidates' cosines; as in the votes for superpoint pairs (docs/methods.md 10.4).
+# Of the softmax over the candidates' cosines; as in the votes for superpoint pairs (docs/methods.md 7.3).
 _TEMPERATURE = 0.05
 # Power of the cosine in a match's weight; 8 and 16 on `sim:val`, 200 pairs, as good.
 _SHARPNESS = 4

@@ -54,14 +54,15 @@ def local_to_global(
     if len(proposals):
         votes = _vote(proposals, target, source, weight, config)
         order = votes.argsort(descending=True, stable=True)
-        inliers = _inliers(proposals[order[0]], target, source, config.acceptance_radius)
+        start = proposals[order[0]]
     else:
         order = torch.zeros(0, dtype=torch.int64, device=target.device)
         start = weighted_procrustes(source, target, weight)
-        inliers = _inliers(start, target, source, config.acceptance_radius)
-    transform = weighted_procrustes(source, target, weight * inliers)
-    for _ in range(config.steps - 1):
+    transform = start
+    for _ in range(config.steps):
         inliers = _inliers(transform, target, source, config.acceptance_radius)
+        if not bool(inliers.any()):  # a fit to nothing would be the identity
+            break
         transform = weighted_procrustes(source, target, weight * inliers)
     inliers = _inliers(transform, target, source, config.acceptance_radius)
     return LgrEstimate(transform, inliers, len(proposals), proposals[order])

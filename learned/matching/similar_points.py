@@ -16,7 +16,7 @@ Array = NDArray[np.float64]
 
 # Partners of a point, in either direction; one or two did as well on `sim:val`, 150 pairs.
 _PARTNERS = 3
-# Of the softmax over the other cloud's points; as in the votes for superpoint pairs (docs/methods.md 10.4).
+# Of the softmax over the other cloud's points; as in the votes for superpoint pairs (docs/methods.md 7.3).
 _TEMPERATURE = 0.05
 
 
@@ -28,7 +28,7 @@ class SimilarPoints(NamedTuple):
     source, target : (K, 3) float64
         Metres, each in its cloud's frame.
     weight : (K,) float64 in (0, 1]
-        One where either point is the other's only match, and less the more others are as similar.
+        One where each point is the other's only match, and less the more others are as similar.
     """
 
     source: Array

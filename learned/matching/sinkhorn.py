@@ -40,7 +40,7 @@ class OptimalTransport(nn.Module):
         have a valid row and a valid column.
         """
         solve = log_sinkhorn if form == "log" else kernel_sinkhorn
-        return solve(scores, rows, columns, self.alpha, iterations or self.iterations)
+        return solve(scores, rows, columns, self.alpha, self.iterations if iterations is None else iterations)
 
 
 def log_sinkhorn(scores: Tensor, rows: Tensor, columns: Tensor, alpha: Tensor, iterations: int) -> Tensor:

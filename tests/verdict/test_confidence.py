@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hybridreg.evidence.evidence import NO_RIVAL, Evidence
-from hybridreg.evidence.log_odds import FAILED, NEARLY, OK, beside, log_odds, model, terms
+from hybridreg.evidence.log_odds import FAILED, OK, OK_LOG_ODDS, beside, log_odds, model, terms
 from hybridreg.verdict.boosted import Boosted
 from hybridreg.verdict.confidence import SPEAKS, believed, confidence, features, trees, word
 from hybridreg.verdict.training.boosting import boost, plain
@@ -112,7 +112,7 @@ def test_what_speaks_for_a_pose_never_lowers_its_confidence_nor_does_the_contrar
 @given(whole)
 def test_two_poses_that_explain_the_data_alike_are_never_ok(evidence: Evidence) -> None:
     assert confidence(replace(evidence, rival_margin=0.0)) <= 0.5
-    assert word(confidence(replace(evidence, rival_margin=-0.8 * NEARLY))) != "ok"
+    assert word(confidence(replace(evidence, rival_margin=-0.8 * OK_LOG_ODDS))) != "ok"
 
 
 @given(whole)

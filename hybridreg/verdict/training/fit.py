@@ -155,7 +155,11 @@ def main() -> None:
     parser.add_argument("--pairs", type=int, default=40, help="of each tier")
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--below", nargs=2, metavar=("NAME", "BOUND"), help="continue for some answers alone")
-    parser.add_argument("--write", type=Path, help="folder in which to write the rule as JSON")
+    parser.add_argument(
+        "--write",
+        type=Path,
+        help="hybridreg/verdict of a checkout, where the trees are written; the log-odds go to evidence/ beside it",
+    )
     parser.add_argument("--picture", type=Path, help="draw the reliability curve of the five folds")
     options = parser.parse_args()
     if options.what == "gather":

@@ -107,3 +107,13 @@ def test_lengths_are_checked(lengths: tuple[int, int, int, int]) -> None:
     p, q, w, g = lengths
     with pytest.raises(ValueError, match="one length"):
         local_to_global(torch.zeros(p, 3), torch.zeros(q, 3), torch.zeros(w), torch.zeros(g))
+
+
+def test_a_proposal_that_no_match_agrees_with_is_kept() -> None:
+    """A fit to no match would be the identity: that is where the clouds happen to lie, not a pose."""
+    source = torch.tensor([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]) * 10.0
+    target = 2.0 * source + torch.tensor([100.0, 0.0, 0.0])
+    found = local_to_global(target, source, torch.ones(4), torch.zeros(4, dtype=torch.int64))
+    assert not bool(found.inliers.any())
+    assert torch.allclose(found.transform, found.proposals[0])
+    assert float(found.transform[:3, 3].norm()) > 50.0
