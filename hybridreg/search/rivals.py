@@ -52,11 +52,11 @@ def find(scene: Scene, own: PoseEvidence, pose: Pose) -> list[Hypothesis]:
     rivals = [*(one for one in likeliest if one.settled), *moved]
     # Guesses that come back to the pose are no rivals, and must not hide those behind them.
     apart = best(with_matches(scene, one) for one in rivals if is_rival(one.T))[:_ENOUGH]
+    its_log_odds = with_matches(scene, Hypothesis(at=own, by_surfaces=own.by_surfaces)).log_odds
 
     def came_to_rest(one: Hypothesis) -> bool:
         # Where surfaces hold a pose loosely, a rival may have stopped on its way to it.
-        far_behind = one.by_surfaces < own.by_surfaces - _CONTENDS
-        return far_behind or is_rival(settle_closely(views.fine, one.T))
+        return one.log_odds < its_log_odds - _CONTENDS or is_rival(settle_closely(views.fine, one.T))
 
     return [one for one in apart if came_to_rest(one)]
 

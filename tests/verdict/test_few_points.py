@@ -33,7 +33,7 @@ NONE = Correspondences.none()
         (400, "ok"),
         (406, "ok"),
         (410, "ok"),
-        (438, "ok"),
+        (438, "doubtful"),
         (414, "doubtful"),
         (472, "doubtful"),
         (428, "doubtful"),
