@@ -20,6 +20,11 @@ Array = NDArray[np.float64]
 
 # Farthest partners of the steps, spacings: wide enough to pull in a guess that is some cells off, then tight; by hand.
 _STEPS = (6.0, 4.0, 3.0, 2.0, 2.0)
+# For a guess that may be two or three metres off: on a field, where few surfaces pull, a quicker descent comes to rest
+# on the way; by hand.
+_WIDE = (12.0, 10.0, 8.0, 6.0, 5.0, 4.0, 3.0, 2.0, 2.0)
+# Width of the weights where the search is wide, per farthest partner; by hand.
+_TRUST = 0.25
 # Strides over the sampled points: of the first ranking, of the second, of the second look.
 _QUICK, _ROUGHLY, _CLOSE = 10, 3, 2
 # Best of many starts that are settled closely, at most.
@@ -30,7 +35,7 @@ _LEFT = 12.0
 _AGAIN = 24
 
 
-def settle(views: Views, T: Array, *, stride: int = 3) -> Array:
+def settle(views: Views, T: Array, *, stride: int = 3, wide: bool = False) -> Array:
     """Poses (..., 4, 4) near those of T at which the source's settling points lie best on the target's planes.
 
     Many at once take a third of the time that they take one by one.
@@ -39,8 +44,14 @@ def settle(views: Views, T: Array, *, stride: int = 3) -> Array:
     ----------
     stride : int
         Every so many-th of the settling points is used.
+    wide : bool
+        Look for partners from twice as far, and trust far ones more at first.
     """
-    steps = [(step * views.spacing, views.spacing) for step in _STEPS]
+    spacing = views.spacing
+    steps = [
+        (step * spacing, spacing * (max(1.0, _TRUST * step) if wide else 1.0))
+        for step in (_WIDE if wide else _STEPS)
+    ]
     return descend(T, views.source.points[views.source.settling[::stride]], views.target, steps)
 
 
@@ -81,4 +92,4 @@ def resting(scene: Scene, poses: Sequence[Array]) -> list[Hypothesis]:
 
 def _settled(scene: Scene, starts: Sequence[Array], stride: int, looked_at: int) -> list[Hypothesis]:
     poses = np.array(starts, dtype=np.float64).reshape(-1, 4, 4)
-    return seen_at(scene, settle(views.of(scene), poses, stride=3 * stride), looked_at)
+    return seen_at(scene, settle(views.of(scene), poses, stride=3 * stride, wide=stride == 1), looked_at)

@@ -36,11 +36,17 @@ GROUPS = (*TIERS, "hard", "real")
 # Hard pairs for each pair of a tier, and the first of their even seeds: below it they took part in fits.
 _HARD, _FIRST_SEED = 2, 300
 
+_settle = settle.settle
 # The entries of `default` by what else a user would call them: left out one at a time.
 ENTRIES = {"Manhattan": "manhattan", "KISS-Matcher": "kiss", "relief": "relief", "learned entry": "ransac"}
 # What is put in the place of each other move: module or class, name, replacement.
 PATCHES: dict[str, tuple[Any, str, Any]] = {
     "settling": (settle, "settle", lambda views, T, **how: T),
+    "settling from afar": (
+        settle,
+        "settle",
+        lambda views, T, **how: _settle(views, T, **{**how, "wide": False}),
+    ),
     "GICP": (candidates.Candidates, "_refined", lambda self, scene, one: one),
     "second spectrum": (birdseye, "_LEVELLED", birdseye._LEVELLED[:1]),
     "sliding along a street": (birdseye.BirdsEye, "_slid", lambda self, source, target, voxel: []),
