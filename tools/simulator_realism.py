@@ -137,15 +137,10 @@ def simulated_clouds(match: Match, n: int) -> Iterator[np.ndarray]:
         layout = SCENES[match.scenes[k % len(match.scenes)]](rng)
         # No body under the sensor: its points are left out of the figures, and real mounts clear their roofs.
         stand = single_stand(layout, rng, Carrier(EMPTY, match.height, 1.6))
+        world, sensor = world_with(layout, stand), SENSORS[match.sensor]
         headings = range(0, 360, 45) if match.forward else (0,)
         clouds = [
-            scan(
-                world_with(layout, stand),
-                layout.surface,
-                SENSORS[match.sensor],
-                stand.T_world_sensor @ se3.yaw(heading),
-                rng,
-            )
+            scan(world, layout.surface, sensor, stand.T_world_sensor @ se3.yaw(heading), rng)
             for heading in headings
         ]
         yield max(clouds, key=lambda cloud: float(np.median(np.linalg.norm(cloud, axis=1))))

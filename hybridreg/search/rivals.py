@@ -34,16 +34,16 @@ _UPRIGHT = 0.9
 _QUICK, _CLOSE = 10, 2
 
 
-def find(scene: Scene, own: PoseEvidence, pose: Pose) -> list[Hypothesis]:
-    """Settled rivals of a pose, the likeliest first; `own` is its evidence."""
-    views, centre = own.views, own.information.centre
+def find(scene: Scene, own: Hypothesis, pose: Pose) -> list[Hypothesis]:
+    """Settled rivals of a pose, the likeliest first; `own` is the pose by itself, its matches counted."""
+    views, centre = own.at.views, own.at.information.centre
 
     def is_rival(T: Array) -> bool:
         return differs(T, own.T, centre, views.spacing)
 
     known, guesses = parted(as_hypotheses(pose)[1 : 1 + _OFFERED])
-    turned = _turned(own)
-    guesses += [*turned[_FULLEST:], *copies(views, own.T, own.agreement.axes)]
+    turned = _turned(own.at)
+    guesses += [*turned[_FULLEST:], *copies(views, own.T, own.at.agreement.axes)]
     promising = [*known, *seen_at(scene, [T for T in guesses if is_rival(T)], _QUICK)]
     likeliest = best(with_matches(scene, one) for one in promising if is_rival(one.T))[:_SETTLED]
     guessed = [one.T for one in likeliest if not one.settled]
@@ -52,11 +52,10 @@ def find(scene: Scene, own: PoseEvidence, pose: Pose) -> list[Hypothesis]:
     rivals = [*(one for one in likeliest if one.settled), *moved]
     # Guesses that come back to the pose are no rivals, and must not hide those behind them.
     apart = best(with_matches(scene, one) for one in rivals if is_rival(one.T))[:_ENOUGH]
-    its_log_odds = with_matches(scene, Hypothesis(at=own, by_surfaces=own.by_surfaces)).log_odds
 
     def came_to_rest(one: Hypothesis) -> bool:
         # Where surfaces hold a pose loosely, a rival may have stopped on its way to it.
-        return one.log_odds < its_log_odds - _CONTENDS or is_rival(settle_closely(views.fine, one.T))
+        return one.log_odds < own.log_odds - _CONTENDS or is_rival(settle_closely(views.fine, one.T))
 
     return [one for one in apart if came_to_rest(one)]
 

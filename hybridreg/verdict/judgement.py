@@ -148,7 +148,7 @@ def weigh(scene: Scene, pose: Pose) -> Weighed:
         found_by=pose.found_by,
         matched=match_agreement.share(scene, pose.T),
     )
-    offered = rivals.find(scene, at, pose) if pose.found else []
+    offered = rivals.find(scene, own, pose) if pose.found else []
     own, *found = told_apart([own, *(one for one in offered if scene.pair.allows(one.T))])
     found = best(found)
     evidence = evidence_of(own, found, at.size if pose.found else Size())

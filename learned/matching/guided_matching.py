@@ -3,8 +3,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
@@ -25,9 +23,7 @@ _SHARPNESS = 4
 _FEWEST = 10
 
 
-def guided_pose(
-    T_target_source: Array, source: Described, target: Described, radii: Sequence[float]
-) -> Array:
+def guided_pose(T_target_source: Array, source: Described, target: Described, radii: Array) -> Array:
     """The pose (4, 4) after a round for each radius: match within it, fit.
 
     Each point of either cloud is matched with the most similar of its nearest points in the other. A match weighs
@@ -39,7 +35,7 @@ def guided_pose(
     T_target_source : (4, 4)
         From which to start.
     source, target : Described
-    radii : of float
+    radii : (r,)
         Metres, shrinking: the first is what the start may be off by.
     """
     T = T_target_source

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -24,12 +26,12 @@ _COARSE = np.array([4.0, 2.5, 1.6, 1.0])
 _FINE = np.array([1.6, 1.3, 1.0, 1.0, 1.0])
 
 
-def search(starts: Array, source: Described, target: Described, spacing: float) -> Array | None:
+def search(starts: Sequence[Array], source: Described, target: Described, spacing: float) -> Array | None:
     """The pose (4, 4), or None where no similar points support any.
 
     Parameters
     ----------
-    starts : (s, 4, 4)
+    starts : of (4, 4)
         Poses from elsewhere. Those that upright clouds vote for are added (`upright_votes`).
     source, target : Described
     spacing : float
@@ -40,11 +42,10 @@ def search(starts: Array, source: Described, target: Described, spacing: float) 
     few = _some(source), _some(target)
     pairs = similar_points(*few)
     tried = [*starts, *upright_poses(pairs, spacing, _UPRIGHT)]
-    near = [guided_pose(T, *few, list(spacing * _COARSE)) for T in tried]
-    best = max(near, key=lambda T: pairs.support(T, spacing))
-    if pairs.support(best, spacing) == 0.0:
-        return None
-    return guided_pose(best, source, target, list(spacing * _FINE))
+    near = [guided_pose(T, *few, spacing * _COARSE) for T in tried]
+    support = [pairs.support(T, spacing) for T in near]
+    best = int(np.argmax(support))
+    return guided_pose(near[best], source, target, spacing * _FINE) if support[best] > 0.0 else None
 
 
 def _some(cloud: Described) -> Described:

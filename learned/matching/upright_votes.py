@@ -16,14 +16,16 @@ from hybridreg.learned.matching.similar_points import SimilarPoints
 
 Array = NDArray[np.float64]
 
-_YAWS = np.radians(np.arange(0.0, 360.0, 3.0))  # with 2 degrees no better, with 4 worse; `sim:val`, 150 pairs
+_YAWS = np.arange(
+    0.0, 360.0, 3.0
+)  # degrees; with 2 between them no better, with 4 worse; `sim:val`, 150 pairs
 # How far from the usual one the difference of two points' heights may be, spacings; 1.2 as good on `sim:val`.
 _BAND = 2.0
 _PEAKS = 3  # of one yaw; by hand
 # Shifts of more spacings, from middle to middle, get no votes: a stray point would ask for gigabytes of cells.
 _FARTHEST = 400
-# Two peaks nearer to each other than both are one, spacings and radians; by hand.
-_APART, _TURNED = 2.5, np.radians(8.0)
+# Two peaks nearer to each other than both are one, spacings and degrees; by hand.
+_APART, _TURNED = 2.5, 8.0
 
 
 def upright_poses(pairs: SimilarPoints, spacing: float, most: int) -> Array:
@@ -55,7 +57,7 @@ def upright_poses(pairs: SimilarPoints, spacing: float, most: int) -> Array:
     poses = [
         se3.about(
             middle,
-            se3.rotation_about(np.array([0.0, 0.0, yaw])),
+            se3.yaw(yaw)[:3, :3],
             np.array([moved[0] + spacing * x, moved[1] + spacing * y, height]),
         )
         for _, yaw, x, y in chosen
@@ -73,7 +75,7 @@ def _usual(rise: Array, weight: Array, spacing: float) -> float:
 
 def _peaks(yaw: float, source: Array, target: Array, weight: Array) -> Array:
     # Rows of votes, yaw and shift of the best corners of cells; what four cells that meet there hold is its votes.
-    cosine, sine = np.cos(yaw), np.sin(yaw)
+    cosine, sine = np.cos(np.radians(yaw)), np.sin(np.radians(yaw))
     shift = target - source @ np.array([[cosine, sine], [-sine, cosine]])
     reach = min(int(np.abs(shift).max()) + 2, _FARTHEST)
     cell = np.floor(shift).astype(np.int64) + reach
@@ -89,5 +91,5 @@ def _peaks(yaw: float, source: Array, target: Array, weight: Array) -> Array:
 
 
 def _differ(one: Array, other: Array) -> bool:
-    turn = abs((one[1] - other[1] + np.pi) % (2.0 * np.pi) - np.pi)
+    turn = abs((one[1] - other[1] + 180.0) % 360.0 - 180.0)
     return bool(turn > _TURNED or np.linalg.norm(one[2:] - other[2:]) > _APART)

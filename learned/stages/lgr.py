@@ -88,8 +88,9 @@ class Lgr(Stage):
         config = self.config(matches.spacing or 2.0 * scene.spacing)
         with single():
             found = None if len(rows) < 3 else _estimate(scene, matches, rows, config)
-            start = np.empty((0, 4, 4)) if found is None else found.transform.numpy()[None]
-            T = _guided(scene, matches, start) if self.guided else next(iter(start), None)
+            T: Array | None = None if found is None else found.transform.numpy()
+            if self.guided:
+                T = _guided(scene, matches, [] if T is None else [T])
             if T is None:
                 return Pose.unknown(len(matches))
             residual = np.linalg.norm(se3.apply(T, matches.source[rows]) - matches.target[rows], axis=1)
@@ -135,7 +136,7 @@ class Lgr(Stage):
         return far[~same(far, T, np.median(source, axis=0), consensus)]
 
 
-def _guided(scene: Scene, matches: Correspondences, start: Array) -> Array | None:
+def _guided(scene: Scene, matches: Correspondences, starts: list[Array]) -> Array | None:
     from hybridreg.learned.matching.guided_search import search
 
     if matches.described is None:
@@ -143,7 +144,7 @@ def _guided(scene: Scene, matches: Correspondences, start: Array) -> Array | Non
             f"pair {scene.pair.id}: guided matching compares features of all points, and this match stage hands on "
             "none; use geotransformer or vgam, or guided = false"
         )
-    return search(start, *matches.described, matches.spacing or scene.spacing)
+    return search(starts, *matches.described, matches.spacing or scene.spacing)
 
 
 def _usable(matches: Correspondences) -> Rows:

@@ -12,7 +12,7 @@ from hybridreg.learned.cofinet.network import CofinetNetwork
 from hybridreg.learned.cofinet.targets import compute_targets
 
 
-def test_eighty_steps_overfit_four_pairs() -> None:
+def test_a_hundred_steps_overfit_four_pairs() -> None:
     torch.manual_seed(0)
     network = CofinetNetwork(named_config("nano")).train()
     pairs = four_pairs(network.config, points=400, extent=8.0)
@@ -20,7 +20,7 @@ def test_eighty_steps_overfit_four_pairs() -> None:
     targets = [compute_targets(p.batch.pyramid, p.transform, network.config, generator) for p in pairs]
     optimizer = torch.optim.Adam(network.parameters(), 1e-2)
     rounds: list[list[CofinetLosses]] = []
-    for _ in range(20):
+    for _ in range(25):
         rounds.append([])
         for pair, target in zip(pairs, targets, strict=True):
             losses = network.losses(network.encode(pair.batch), target)
@@ -40,6 +40,5 @@ def test_eighty_steps_overfit_four_pairs() -> None:
         found = network.eval()(pairs[0].batch).matches
     moved = found.source @ pairs[0].transform[:3, :3].t() + pairs[0].transform[:3, 3]
     away = (moved - found.target).norm(dim=1)
-    # By chance 0.06; 0.70 to 0.75 by the rounding of the processor.
-    assert float((away < 2.0).float().mean()) > 0.6, "of a scene of 14 m by 16 m"
+    assert float((away < 2.0).float().mean()) > 0.7, "of a scene of 14 m by 16 m"
     assert not network.untrained()

@@ -84,14 +84,11 @@ def rows(sensor: Sensor, rng: np.random.Generator) -> np.ndarray:
     part = wide / modules
     along = np.linspace(-0.5, 0.5, columns)
     up = np.radians(sensor.middle_deg) + 0.5 * high * np.linspace(1, -1, lines)
-    parts = []
-    for k in range(modules):
-        across = (k - 1) * part + 1.01 * part * along[None, :]
-        # Rows of one module slope by a degree and bow by less, as its mirror turns.
-        parts.append(
-            _directions(across, up[:, None] + 0.017 * along[None, :] + rng.normal(0, 0.0005, lines)[:, None])
-        )
-    return np.concatenate([one.T for one in parts], axis=1).T
+    middle = part * (np.arange(modules) - 1)
+    azimuth = middle[:, None, None] + 1.01 * part * along
+    # Rows slope by a degree over the width of their module.
+    elevation = up[:, None] + 0.017 * along + rng.normal(0, 0.0005, (modules, lines))[:, :, None]
+    return _directions(azimuth, elevation)
 
 
 PATTERNS: dict[str, Callable[[Sensor, np.random.Generator], np.ndarray]] = {
