@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Pairs a second that training takes on this machine: one process on the CPU, one and several on a GPU.
 
-``python -m benchmarks.training_speed --processes 1,4`` trains the recipe `warm-up` with each and reads its
+``python -m benchmarks.training_speed --processes 1,4 --batch 32`` trains the recipe `warm-up` with each and reads its
 log. Prepared pairs are stored in ``--cache``.
 """
 
@@ -17,7 +17,6 @@ import torch
 import typer
 
 _STEPS = 30  # optimiser steps, by hand
-_BATCH = 8  # pairs a step, by hand
 _PAIRS = 40  # of each tier, by hand
 _RECIPE = """
 base = "warm-up"
@@ -36,12 +35,17 @@ losses = {{ infonce = 1.0, coarse = {others}, fine = {others}, mask = 0.0 }}
 
 
 def main(
-    processes: str = "1", cache: Path = Path("runs/prepared"), workers: int = 2, matching: bool = False
+    processes: str = "1",
+    batch: int = 8,
+    cache: Path = Path("runs/prepared"),
+    workers: int = 2,
+    matching: bool = False,
 ) -> None:
-    """Print a Markdown table; ``--matching`` trains superpoint and point matching too."""
-    recipe = _RECIPE.format(
-        half=_STEPS // 2, pairs=_PAIRS, steps=_STEPS, batch=_BATCH, others=float(matching)
-    )
+    """Print a Markdown table; ``--matching`` trains superpoint and point matching too.
+
+    ``--batch`` is the pairs of a step. On a GPU those of a process go through the backbone at once, 32 at most.
+    """
+    recipe = _RECIPE.format(half=_STEPS // 2, pairs=_PAIRS, steps=_STEPS, batch=batch, others=float(matching))
     kinds = [("cpu", 1)]
     if torch.cuda.is_available():
         kinds += [("cuda", int(n)) for n in processes.split(",")]
@@ -50,7 +54,7 @@ def main(
     for accelerator, n in kinds:
         with TemporaryDirectory() as folder:
             (Path(folder) / "speed.toml").write_text(recipe)
-            speed = _BATCH * _steps_a_second(Path(folder), accelerator, n, cache, workers)
+            speed = batch * _steps_a_second(Path(folder), accelerator, n, cache, workers)
         first = first or speed
         name = torch.cuda.get_device_name() if accelerator == "cuda" else "CPU"
         print(f"| {name} | {n} | {speed:.1f} | {speed / first:.1f} |", flush=True)

@@ -55,6 +55,13 @@ def settle(views: Views, T: Array, *, stride: int = 3, wide: bool = False) -> Ar
     return descend(T, views.source.points[views.source.settling[::stride]], views.target, steps)
 
 
+def at_rest(views: Views, T: Array) -> Array:
+    """Where a pose (4, 4) comes to rest, (2, 4, 4): on the planes, and from there on surfaces as fine as the clouds
+    show them."""
+    roughly = settle(views, T)
+    return np.array([roughly, settle_closely(views.fine, roughly)])
+
+
 def best_first(scene: Scene, starts: Sequence[Array | Hypothesis]) -> list[Hypothesis]:
     """The likeliest of some starts, at most eight, each where it fits best; of those that meet, one.
 

@@ -37,19 +37,26 @@ def reasons(
     started: bool = False,
     through_walls: bool = False,
     slack: Tolerance | None = None,
+    drawn: Tolerance | None = None,
 ) -> tuple[str, ...]:
     """Why the verdict is what it is; never empty. `unseen` says why the viewpoint of a cloud is unknown.
 
     `explained`: a sentence before these says why no pose was found; `started`: the search began at a given start;
     `through_walls`: more of the walls of flat scans is seen through than at any right pose; `slack`: degrees and metres
-    by which a right pose may well be off, where that is more than the tolerance.
+    by which a right pose may well be off, where that is more than the tolerance; `drawn`: those by which it is off
+    where the surfaces fit best.
     """
     if not found:
         instead = "the start" if started else "the identity"
         if explained:
             return (f"no pose is left: {instead} was returned",)
         return (f"no pose was found: the estimator had nothing to work with, and returned {instead}",)
-    against = (*_against(evidence, agreement, held, through_walls), *_inexact(slack), *_unknown(unseen))
+    against = (
+        *_elsewhere(drawn),
+        *_against(evidence, agreement, held, through_walls),
+        *_inexact(slack),
+        *_unknown(unseen),
+    )
     return (*against, _in_favour(evidence)) if against else (_in_favour(evidence),)
 
 
@@ -90,6 +97,14 @@ def _against(
     overlap = max(evidence.visible_source, evidence.visible_target)
     if overlap < OVERLAP:
         yield f"little overlap: neither sensor sees more than {overlap:.0%} of the other's points"
+
+
+def _elsewhere(drawn: Tolerance | None) -> Iterator[str]:
+    if drawn is not None:
+        yield (
+            f"the surfaces draw the pose {drawn.degrees:.1f} deg and {drawn.metres:.2g} m away, where they fit better; "
+            'if it was not refined, refine it: refine="gicp" (--set refine=gicp)'
+        )
 
 
 def _inexact(slack: Tolerance | None) -> Iterator[str]:

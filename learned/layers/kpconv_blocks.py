@@ -26,8 +26,8 @@ class Surroundings:
     """The geometry that a block needs: its queries, supports and links."""
 
     neighbors: Tensor  # (N, k) into the supports, pad M
-    lengths: tuple[int, int]  # queries of the target, of the source
-    support_lengths: tuple[int, int]
+    lengths: tuple[int, ...]  # queries of each cloud
+    support_lengths: tuple[int, ...]
     links: Links | DenseLinks
     influence: Influence | DenseInfluence | None = None  # where the layers share their kernel points
 
@@ -45,11 +45,10 @@ class PointGroupNorm(nn.Module):
         self.weight = nn.Parameter(torch.ones(dim))
         self.bias = nn.Parameter(torch.zeros(dim))
 
-    def forward(self, features: Tensor, lengths: tuple[int, int], slope: float = 1.0) -> Tensor:
-        """(N, C) to (N, C); ``lengths`` splits the rows into target and source, ``slope`` is a LeakyReLU's."""
-        parts = features.split(list(lengths)) if self.per_cloud else [features]
-        done = [group_norm(part, self.weight, self.bias, self.groups, slope) for part in parts]
-        return done[0] if len(done) == 1 else torch.cat(done)
+    def forward(self, features: Tensor, lengths: tuple[int, ...], slope: float = 1.0) -> Tensor:
+        """(N, C) to (N, C); ``lengths`` splits the rows into clouds, ``slope`` is a LeakyReLU's."""
+        clouds = lengths if self.per_cloud else (len(features),)
+        return group_norm(features, clouds, self.weight, self.bias, self.groups, slope)
 
 
 class PointInstanceNorm(nn.Module):
@@ -59,10 +58,12 @@ class PointInstanceNorm(nn.Module):
     keeps no statistics, and training and evaluation compute the same.
     """
 
-    def forward(self, features: Tensor, lengths: tuple[int, int], slope: float = 1.0) -> Tensor:
+    def forward(self, features: Tensor, lengths: tuple[int, ...], slope: float = 1.0) -> Tensor:
         """(N, C) to (N, C); ``slope`` is a LeakyReLU's."""
         dim = features.shape[1]
-        return group_norm(features, features.new_ones(dim), features.new_zeros(dim), dim, slope)
+        return group_norm(
+            features, (len(features),), features.new_ones(dim), features.new_zeros(dim), dim, slope
+        )
 
 
 def point_norm(dim: int, groups: int | None, per_cloud: bool) -> PointGroupNorm | PointInstanceNorm:
@@ -84,11 +85,11 @@ class Unary(nn.Module):
         self.linear = nn.Linear(dim_in, dim_out, bias=groups is not None)
         self.norm = point_norm(dim_out, groups, per_cloud)
 
-    def forward(self, features: Tensor, lengths: tuple[int, int]) -> Tensor:
+    def forward(self, features: Tensor, lengths: tuple[int, ...]) -> Tensor:
         """(N, C_in) to (N, C_out)."""
         return self.normalize(self.linear(features), lengths)
 
-    def normalize(self, features: Tensor, lengths: tuple[int, int]) -> Tensor:
+    def normalize(self, features: Tensor, lengths: tuple[int, ...]) -> Tensor:
         """What follows the linear layer, (N, C_out) to (N, C_out)."""
         return self.norm(features, lengths, _SLOPE if self.activate else 1.0)
 

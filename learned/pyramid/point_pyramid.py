@@ -34,10 +34,11 @@ class PyramidPlan(Protocol):
 
 @dataclass(frozen=True, kw_only=True)
 class Pyramid:
-    """Both clouds stacked, target first, at every stage; neighbours never cross clouds."""
+    """Both clouds stacked, target first, at every stage; neighbours never cross clouds. Of several pairs after one
+    another: `hybridreg.learned.pyramid.packed`."""
 
     points: tuple[Tensor, ...]  # stage s: (N_s, 3) float32, metres
-    lengths: tuple[tuple[int, int], ...]  # stage s: points of the target, points of the source
+    lengths: tuple[tuple[int, ...], ...]  # stage s: points of the target, points of the source
     neighbors: tuple[Tensor, ...]  # stage s: (N_s, k_s) int64 into stage s, pad N_s
     subsampling: tuple[Tensor, ...]  # stage s+1's points: (N_{s+1}, k_s) int64 into stage s, pad N_s
     upsampling: tuple[Tensor, ...]  # stage s: (N_s,) int64, the nearest point of stage s+1, or pad N_{s+1}
@@ -62,7 +63,7 @@ class Pyramid:
         )
 
     def clouds(self, stage: int) -> tuple[Tensor, Tensor]:
-        """Points (n, 3) of the target and of the source at a stage counted from 0."""
+        """Points (n, 3) of the target and of the source of one pair at a stage counted from 0."""
         target, source = self.points[stage].split(list(self.lengths[stage]))
         return target, source
 

@@ -9,22 +9,18 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
 import torch
 from torch import nn
 
-from hybridreg.learned.cross3dreg.network import RegistrationNetwork
-from hybridreg.learned.cross3dreg.training_mask import MaskJitter
 from hybridreg.learned.pretrained import Pretrained
 from hybridreg.learned.training import checkpoint
 from hybridreg.learned.training.checkpoint import Progress
-from hybridreg.learned.training.data.frozen import FrozenFeatures, lasting
 from hybridreg.learned.training.data.opened_source import OpenedSource
 from hybridreg.learned.training.data.order import Order
 from hybridreg.learned.training.data.samples import PhaseSamples, Sample, Unusable, stream
-from hybridreg.learned.training.data.training_examples import Example, learn
+from hybridreg.learned.training.data.training_examples import Example
+from hybridreg.learned.training.forward_pass import ForwardPass
 from hybridreg.learned.training.gradients import StepOutcome, finish_step
-from hybridreg.learned.training.objective import Outcome, objective
 from hybridreg.learned.training.recipe import Phase, Recipe
 from hybridreg.learned.training.record import Record
 from hybridreg.learned.training.schedule import make_optimizer, rate_at, set_rate, steps_of, trainable
@@ -35,6 +31,7 @@ if TYPE_CHECKING:
 
 _log = logging.getLogger(__name__)
 CHECKPOINT = "checkpoint.pt"
+Upcoming = Iterator[Sample | Example | Unusable]
 
 
 class Loop:
@@ -74,11 +71,11 @@ class Loop:
         samples, steps = self._samples(phase, batch)
         parameters = trainable(optimizer)
         self.record.begin_phase(phase, steps)
-        self._frozen = self._known(phase)
+        losses = ForwardPass(self.network, self.recipe, phase, self._seed())
         upcoming = stream(samples, self._numbers(batch, steps), self.recipe.data.loaders)
         for step in range(self.progress.step, steps):
             set_rate(optimizer, rate_at(phase, step, steps))
-            bad = self._gather(phase, samples, upcoming, step * batch, batch)
+            bad = self._gather(losses, samples, upcoming, step * batch, batch)
             votes = (self.stop.asked, self._due())
             outcome = finish_step(self.fabric, optimizer, parameters, bad, self.recipe.clip, *votes)
             self._note(outcome, samples, range(step * batch, (step + 1) * batch))
@@ -93,65 +90,33 @@ class Loop:
         return True
 
     def _gather(
-        self,
-        phase: Phase,
-        samples: PhaseSamples,
-        upcoming: Iterator[Sample | Example | Unusable],
-        first: int,
-        batch: int,
+        self, losses: ForwardPass, samples: PhaseSamples, upcoming: Upcoming, first: int, batch: int
     ) -> torch.Tensor:
         # Gradients of this process's share of the batch; 1 in the result where a loss was not finite.
         bad = torch.zeros(batch, device=self.fabric.device)
-        for places in self._together(batch):
+        mine = range(self.fabric.global_rank, batch, self.fabric.world_size)
+        for places in losses.groups(mine, self.fabric.device):
             with self.record.data_time():
                 found = [next(upcoming) for _ in places]
             assert [each.number for each in found] == [first + place for place in places]
-            usable = [each for each in found if not isinstance(each, Unusable)]
             for place, each in zip(places, found, strict=True):
                 if isinstance(each, Unusable):
                     _log.warning("pair %s cannot be used: %s", each.id, each.problem)
                     bad[place] = 1.0
-            if len(usable) < len(found):
-                continue
-            outcome = self._forward(phase, usable, samples)
-            if bool(torch.isfinite(outcome.total)):
-                (outcome.total * len(places) / batch).backward()
-                self.record.outcome(self.network, outcome, usable[0])
-            else:
-                bad[places] = 1.0
+            here = [each.to(self.fabric.device) for each in found if not isinstance(each, Unusable)]
+            if len(here) < len(found):
+                continue  # a step with a bad pair is skipped as a whole
+            with self.fabric.autocast():
+                outcomes = list(losses(here, [samples.order[each.number] for each in here]))
+            totals = torch.stack([outcome.total for outcome in outcomes])
+            finite = torch.isfinite(totals.detach())
+            # One outcome a place, or one of all of them.
+            bad[places] = (~finite).float().expand(len(places))
+            if bool(finite.all()):
+                (totals.mean() * len(places) / batch).backward()
+                for outcome, one in zip(outcomes, here, strict=False):
+                    self.record.outcome(self.network, outcome, one)
         return bad
-
-    def _together(self, batch: int) -> list[list[int]]:
-        """Indices of this process in a step's batch, grouped by what is processed at once."""
-        mine = list(range(self.fabric.global_rank, batch, self.fabric.world_size))
-        return [mine] if self.network.together else [[place] for place in mine]
-
-    def _forward(self, phase: Phase, found: Sequence[Sample | Example], samples: PhaseSamples) -> Outcome:
-        seeds = np.random.SeedSequence([*self._seed(), 3, found[0].number]).generate_state(2)
-        torch.manual_seed(int(seeds[0]))  # for random choices of the network itself: dropped images
-        generator = torch.Generator().manual_seed(int(seeds[1]))
-        here = [each.to(self.fabric.device) for each in found]
-        with self.fabric.autocast():
-            if isinstance(here[0], Example):
-                return learn(self.network, [each for each in here if isinstance(each, Example)])
-            assert isinstance(self.network, RegistrationNetwork)
-            assert self._frozen is not None
-            sample = here[0]
-            return objective(
-                self.network,
-                sample,
-                phase.losses,
-                self.recipe.infonce,
-                MaskJitter(use_predicted=phase.use_predicted),
-                generator,
-                self._frozen.of(samples.order[sample.number], sample.batch),
-            )
-
-    def _known(self, phase: Phase) -> FrozenFeatures | None:
-        if not isinstance(self.network, RegistrationNetwork):
-            return None
-        keep = lasting(phase, self.recipe.augmentation, self.recipe.network.backbone)
-        return FrozenFeatures(self.network, keep)
 
     def _samples(self, phase: Phase, batch: int) -> tuple[PhaseSamples, int]:
         weights = [

@@ -50,11 +50,11 @@ def objective(
 ) -> Outcome:
     """Losses of a sample, ready for ``backward``. The network must be in training mode.
 
-    ``known`` is the output of a frozen backbone for this sample.
+    ``known`` is the backbone's output for this sample, where that is known.
     """
     hits: Tensor | None = None
     if not weights.matcher:
-        points, features = fine_features(network, sample)
+        points, features = fine_features(network, sample, known)
         loss, hits = contrastive_loss(network, sample, points, features, contrast, generator)
         return Outcome(total=weights.infonce * loss, parts={"infonce": loss}, hits=hits)
     encoding = network.encode(sample.batch, known)
@@ -96,11 +96,11 @@ def contrastive_loss(
 
 
 def fine_features(
-    network: RegistrationNetwork, sample: Sample
+    network: RegistrationNetwork, sample: Sample, known: Known | None = None
 ) -> tuple[tuple[Tensor, Tensor], tuple[Tensor, Tensor]]:
     """Fine points and their features from the backbone alone, target first."""
     pyramid = sample.batch.pyramid
     stage = network.config.backbone.fine_stage - 1
-    _, fine = network.backbone(sample.batch.features, pyramid)
+    fine = known.fine if known else network.backbone(sample.batch.features, pyramid)[1]
     target, source = fine.split(list(pyramid.lengths[stage]))
     return pyramid.clouds(stage), (target, source)

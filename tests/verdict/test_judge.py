@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: MIT
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 from made_places import Made, make
@@ -11,6 +13,7 @@ from hybridreg.data import open_dataset
 from hybridreg.data.hard import box_world
 from hybridreg.eval.score import metrics
 from hybridreg.evidence import views
+from hybridreg.frames import lower_pose
 from hybridreg.geometry import se3
 from hybridreg.matches import Correspondences, Pose
 from hybridreg.scene import Scene
@@ -52,6 +55,38 @@ def test_a_slide_along_the_street_is_not_ok(crossing: Made, metres: float) -> No
     if np.linalg.norm((slid - crossing.truth)[:3, 3]) < 1.0:
         pytest.skip("it slid back")
     assert judge(crossing.scene, Pose(slid), NONE).verdict != "ok"
+
+
+def aside(
+    scene: Scene, truth: np.ndarray, degrees: float, metres: float, rng: np.random.Generator
+) -> np.ndarray:
+    """The true pose, turned about the vertical and shifted at the middle of the source."""
+    middle = se3.apply(truth, views.of(scene).middle)[0]
+    direction = rng.normal(size=3) * [1.0, 1.0, 0.1]
+    R = se3.yaw(degrees)[:3, :3]
+    t = middle + metres * direction / np.linalg.norm(direction) - R @ middle
+    return se3.from_rt(R, t) @ truth
+
+
+@pytest.mark.parametrize(
+    ("tier", "number"), [("near", 2), ("near", 3), ("far", 0), ("far", 5), ("degenerate", 1)]
+)
+def test_a_pose_just_beyond_the_tolerance_is_not_ok(tier: str, number: int) -> None:
+    # One that nobody refined lies so near the right one that all evidence speaks for it.
+    labelled = open_dataset(f"sim:val/{tier}")[number]
+    scene, truth = VoxelGrid()(labelled.pair), lower_pose(labelled.T_target_source, labelled.pair)
+    rng = np.random.default_rng(number)
+    for degrees, metres in ((2.6, 0.0), (4.0, 0.0), (0.0, 0.6), (0.0, 0.8), (0.0, 1.6), (1.5, 0.7)):
+        judgement = judge(scene, Pose(aside(scene, truth, degrees, metres, rng)), NONE)
+        assert judgement.verdict != "ok", (degrees, metres, words(judgement))
+
+
+def test_how_far_the_surfaces_draw_a_pose_is_told() -> None:
+    labelled = open_dataset("sim:val/near")[2]
+    scene, truth = VoxelGrid()(labelled.pair), lower_pose(labelled.T_target_source, labelled.pair)
+    judgement = judge(scene, Pose(aside(scene, truth, 0.0, 0.6, np.random.default_rng(0))), NONE)
+    assert judgement.verdict == "doubtful"
+    assert re.match(r"the surfaces draw the pose 0\.\d deg and 0\.(5|6)\d? m away", judgement.reasons[0])
 
 
 def test_another_street_is_failed_wherever_it_is_laid(elsewhere: Scene) -> None:

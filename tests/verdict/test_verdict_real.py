@@ -48,6 +48,20 @@ def test_true_pose_ok_and_its_half_turn_and_slides_failed(real_data: Path, name:
             assert judgement.verdict == "failed", judgement.reasons
 
 
+@pytest.mark.parametrize("name", PAIRS)
+def test_a_pose_just_beyond_the_tolerance_is_not_ok_on_real_pairs(real_data: Path, name: str) -> None:
+    if not (real_data / name).is_dir():
+        pytest.skip(f"no pair {name}")
+    scene, truth = scene_of(real_data, name, name), truth_of(real_data, name)
+    middle = se3.apply(truth, views.of(scene).middle)[0]
+    across, _, along = np.linalg.eigh(np.cov(scene.target.points.T))[1].T
+    turn = se3.rotation_about(np.radians(2.6) * across)
+    near = [se3.from_rt(np.eye(3), metres * along) for metres in (-1.1, -0.6, 0.6, 1.1)]
+    for step in (*near, se3.from_rt(turn, middle - turn @ middle)):
+        judgement = judge(scene, Pose(step @ truth), Correspondences.none())
+        assert judgement.verdict != "ok", judgement.reasons
+
+
 def _axes(scene: Scene) -> tuple[np.ndarray, np.ndarray]:
     spread = np.linalg.eigh(np.cov(scene.target.points.T))[1]
     return spread[:, 0], spread[:, 2]

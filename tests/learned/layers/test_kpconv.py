@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -10,9 +11,10 @@ import pytest
 import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from torch import Tensor
 
 from hybridreg.learned.layers.dense_influence import DenseLinks
-from hybridreg.learned.layers.group_norm import group_norm
+from hybridreg.learned.layers.group_norm import all_at_once, group_norm
 from hybridreg.learned.layers.influence import find_links
 from hybridreg.learned.layers.kernel_points import cylindrical_kernel_points, kernel_points
 from hybridreg.learned.layers.kpconv import KPConv, kernel_point_convolution
@@ -117,7 +119,24 @@ def test_group_norm_gradients(slope: float) -> None:
     gen = torch.Generator().manual_seed(0)
     values = [torch.randn(shape, dtype=torch.float64, generator=gen) for shape in ((7, 6), (6,), (6,))]
     inputs = [value.requires_grad_() for value in values]
-    assert torch.autograd.gradcheck(lambda f, w, b: group_norm(f + 5, w, b, 2, slope), inputs)
+    assert torch.autograd.gradcheck(lambda f, w, b: group_norm(f + 5, (4, 3), w, b, 2, slope), inputs)
+
+
+@pytest.mark.parametrize("slope", [1.0, 0.1])
+def test_norm_of_many_clouds_at_once_equals_that_of_each(slope: float) -> None:
+    lengths = (40, 1, 300, 7, 90)
+    gen = torch.Generator().manual_seed(1)
+    shapes = ((sum(lengths), 12), (12,), (12,))
+    values = [torch.randn(shape, dtype=torch.float64, generator=gen) for shape in shapes]
+    upstream = torch.randn(shapes[0], dtype=torch.float64, generator=gen)
+
+    def gradients(norm: Callable[..., Tensor]) -> list[Tensor]:
+        inputs = [value.clone().requires_grad_() for value in values]
+        out = norm(inputs[0] * 3 + 100, lengths, inputs[1], inputs[2], 4, slope)
+        return [out, *torch.autograd.grad(out, inputs, upstream)]
+
+    for got, want in zip(gradients(all_at_once), gradients(group_norm), strict=True):
+        assert torch.allclose(got, want, rtol=1e-9, atol=1e-9)
 
 
 def test_per_cloud_norm_ignores_the_other_cloud() -> None:

@@ -10,7 +10,7 @@ import pytest
 import torch
 from training_runs import MakeRecipe, log, options, state
 
-from hybridreg.learned.training import loop
+from hybridreg.learned.training import forward_pass
 from hybridreg.learned.training.data.augmentation import Augmentation
 from hybridreg.learned.training.data.frozen import lasting
 from hybridreg.learned.training.recipe import Phase, Recipe
@@ -32,16 +32,16 @@ def test_kept_features_train_the_same_heads(
     for active in (True, False):
         calls: list[int] = []
         with monkeypatch.context() as patch:
-            patch.setattr(loop, "lasting", lambda *_, active=active: active)
+            patch.setattr(forward_pass, "lasting", lambda *_, active=active: active)
             out = tmp_path / str(active)
-            original = loop.FrozenFeatures.of
+            original = forward_pass.FrozenFeatures.of
 
             def counted(self: Any, *rest: Any, calls: list[int] = calls, original: Any = original) -> Any:
                 found = original(self, *rest)
                 calls.append(len(self._known))
                 return found
 
-            patch.setattr(loop.FrozenFeatures, "of", counted)
+            patch.setattr(forward_pass.FrozenFeatures, "of", counted)
             train(recipe, options(out, cache))
         runs.append(([float(row["loss"]) for row in log(out)], calls))
     (kept, known), (fresh, nothing) = runs

@@ -18,7 +18,7 @@ from training_runs import log, options, same, state
 from hybridreg import testing
 from hybridreg.geometry import se3
 from hybridreg.learned.network_table import DEFAULT, NETWORKS, network_class
-from hybridreg.learned.training import checkpoint, loop, recipe_file
+from hybridreg.learned.training import checkpoint, forward_pass, recipe_file
 from hybridreg.learned.training.data.training_examples import learn
 from hybridreg.learned.training.objective import Outcome
 from hybridreg.learned.training.training_run import train
@@ -85,7 +85,7 @@ def test_each_trains_validates_and_resumes(
     # Once more, stopped in its second step.
     with monkeypatch.context() as patched:
         calls = 2 if cls.together else 3
-        patched.setattr(loop, "learn", on_call(calls))
+        patched.setattr(forward_pass, "learn", on_call(calls))
         assert train(recipe, options(broken, cache)) is None
     assert checkpoint.load(broken / "checkpoint.pt")["progress"].total == 2
     assert train(recipe, options(broken, cache, resume=True)) == broken / "best"

@@ -14,7 +14,7 @@ from typing import Any
 import pytest
 from training_runs import MakeRecipe, Run, environment, log, options, same, state, write_recipe
 
-from hybridreg.learned.training import checkpoint, loop
+from hybridreg.learned.training import checkpoint, forward_pass
 from hybridreg.learned.training.objective import Outcome
 from hybridreg.learned.training.training_run import train
 
@@ -65,7 +65,7 @@ def on_call(number: int, do: Callable[[], None]) -> Callable[..., Outcome]:
             do()
         return true_objective(*arguments)
 
-    true_objective = loop.objective
+    true_objective = forward_pass.objective
     return called
 
 
@@ -74,7 +74,7 @@ def test_sigterm_finishes_the_step_and_saves(
 ) -> None:
     before = signal.getsignal(signal.SIGTERM)
     with monkeypatch.context() as patched:
-        patched.setattr(loop, "objective", on_call(5, lambda: signal.raise_signal(signal.SIGTERM)))
+        patched.setattr(forward_pass, "objective", on_call(5, lambda: signal.raise_signal(signal.SIGTERM)))
         assert train(whole.recipe, options(tmp_path / "run", cache)) is None
     assert signal.getsignal(signal.SIGTERM) == before
     progress = checkpoint.load(tmp_path / "run" / "checkpoint.pt")["progress"]
@@ -92,7 +92,7 @@ def test_a_second_signal_ends_at_once(
         signal.raise_signal(signal.SIGINT)
         signal.raise_signal(signal.SIGINT)
 
-    monkeypatch.setattr(loop, "objective", on_call(2, twice))
+    monkeypatch.setattr(forward_pass, "objective", on_call(2, twice))
     with pytest.raises(KeyboardInterrupt):
         train(whole.recipe, options(tmp_path, cache))
 

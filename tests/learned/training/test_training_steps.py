@@ -15,9 +15,11 @@ import torch
 from torch import Tensor
 from training_runs import WARM_UP, MakeRecipe, log, options, same, state
 
-from hybridreg.learned.training import loop
+from hybridreg.learned.training import forward_pass, loop
+from hybridreg.learned.training.initial_weights import first_network
 from hybridreg.learned.training.objective import Outcome
 from hybridreg.learned.training.processes import start_processes
+from hybridreg.learned.training.schedule import make_optimizer
 from hybridreg.learned.training.training_run import train
 
 PHASE = {"name": "warm-up", "steps": 4, "rate": 1e-3, "losses": WARM_UP}
@@ -25,7 +27,7 @@ PHASE = {"name": "warm-up", "steps": 4, "rate": 1e-3, "losses": WARM_UP}
 
 def spoiled(at: int, spoil: Callable[[Tensor], Tensor]) -> Callable[..., Outcome]:
     """The objective with another total for the sample of that number."""
-    true_objective = loop.objective
+    true_objective = forward_pass.objective
 
     def called(network: torch.nn.Module, sample: Any, *rest: Any) -> Outcome:
         outcome = true_objective(network, sample, *rest)
@@ -56,7 +58,7 @@ def test_a_bad_step_is_skipped_counted_and_named(
     what: str,
 ) -> None:
     recipe = make_recipe(phase=[PHASE], log_every=1, data={"train": make_recipe().to_dict()["data"]["train"]})
-    monkeypatch.setattr(loop, "objective", spoiled(2, spoil))
+    monkeypatch.setattr(forward_pass, "objective", spoiled(2, spoil))
     before: list[dict[str, Tensor]] = []
     true_step = loop.finish_step
 
@@ -86,7 +88,7 @@ def test_one_bad_pair_spoils_its_whole_batch_and_is_named_alone(
     make_recipe: MakeRecipe, cache: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     recipe = make_recipe(phase=[{**PHASE, "accumulate": 2, "steps": 2}])
-    monkeypatch.setattr(loop, "objective", spoiled(1, not_a_number))
+    monkeypatch.setattr(forward_pass, "objective", spoiled(1, not_a_number))
     train(recipe, options(tmp_path, cache))
     skipped = json.loads((tmp_path / "best" / "card.json").read_text())["skipped"]
     assert list(skipped.values()) == [1]
@@ -119,3 +121,17 @@ def test_gradients_are_clipped_to_the_given_length() -> None:
     assert torch.allclose(weight.detach(), torch.tensor([-0.6, 0.0, -0.8, 0.0]), atol=1e-5)
     assert weight.grad is None
     assert (outcome.stepped, outcome.stop, outcome.due) == (True, False, False)
+
+
+@pytest.mark.parametrize("name", ["sgd", "adam", "adamw"])
+def test_a_parameter_may_get_its_first_gradient_after_others(make_recipe: MakeRecipe, name: str) -> None:
+    recipe = make_recipe(phase=[{**PHASE, "optimizer": name}])
+    network = first_network(recipe)
+    optimizer = make_optimizer(recipe.phase[0], network)
+    early, late = list(network.backbone.parameters()), list(network.in_proj.parameters())
+    for parameters in (early, early + late):
+        for parameter in parameters:
+            parameter.grad = torch.ones_like(parameter)
+        before = network.in_proj.weight.detach().clone()
+        optimizer.step()
+    assert not torch.equal(network.in_proj.weight, before)
