@@ -72,7 +72,7 @@ def require_memory(pyramid: Pyramid, config: NetworkConfig) -> None:
     require_bytes(forward_bytes(pyramid, config), pyramid.lengths[0], pyramid.points[0].device, cure)
 
 
-def require_bytes(needed: int, lengths: tuple[int, int], device: torch.device | str, cure: str) -> None:
+def require_bytes(needed: int, lengths: tuple[int, ...], device: torch.device | str, cure: str) -> None:
     """Refuse what would not fit a device: bytes needed for target and source points of these numbers.
 
     Raises
