@@ -334,7 +334,16 @@ def test_an_unregistered_stage_is_not_written_to_a_file(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     "name",
-    ["icp", "fpfh-ransac", "fpfh-ransac-gicp", "fpfh-fgr-gicp", "kiss-gicp", "birdseye-gicp", "default"],
+    [
+        "icp",
+        "fpfh-ransac",
+        "fpfh-ransac-gicp",
+        "fpfh-fgr-gicp",
+        "kiss-gicp",
+        "birdseye-gicp",
+        "verify",
+        "default",
+    ],
 )
 def test_presets_build_pickle_and_clone(name: str) -> None:
     pipe = hr.Pipeline.preset(name, voxel=0.5)

@@ -244,6 +244,24 @@ def test_matches_of_the_user_are_moved_along() -> None:
     assert np.allclose(result.matches.source, points)
 
 
+def test_a_pose_from_elsewhere_is_judged_and_not_moved(demo: Any) -> None:
+    source, target, truth = demo
+
+    def judged(T: np.ndarray) -> hr.RegistrationResult:
+        result = hr.register(source, target, preset="verify", init=T)
+        assert np.allclose(result.transformation, T, atol=1e-9)
+        return result
+
+    assert judged(truth).verdict == "ok"
+    for metres in (-1.2, -0.6, 0.6, 1.2):
+        for axis in np.eye(3):
+            assert judged(se3.from_rt(np.eye(3), metres * axis) @ truth).verdict != "ok"
+    assert judged(se3.yaw(180.0) @ truth).verdict == "failed"
+    as_they_lie = hr.register(source, target, preset="verify")
+    assert np.array_equal(as_they_lie.transformation, np.eye(4))
+    assert as_they_lie.verdict == "failed"
+
+
 def test_it_stands_in_files_and_tables(demo: Any, tmp_path: Path) -> None:
     source, target, truth = demo
     pipe = hr.Pipeline.preset("icp").swap(

@@ -19,11 +19,11 @@ from hybridreg.learned.training.data.opened_source import OpenedSource
 from hybridreg.learned.training.data.order import Order
 from hybridreg.learned.training.data.samples import PhaseSamples, Sample, Unusable, stream
 from hybridreg.learned.training.data.training_examples import Example
-from hybridreg.learned.training.forward_pass import ForwardPass
-from hybridreg.learned.training.gradients import StepOutcome, finish_step
 from hybridreg.learned.training.recipe import Phase, Recipe
 from hybridreg.learned.training.record import Record
-from hybridreg.learned.training.schedule import make_optimizer, rate_at, set_rate, steps_of, trainable
+from hybridreg.learned.training.steps.forward_pass import ForwardPass
+from hybridreg.learned.training.steps.gradients import StepOutcome, finish_step
+from hybridreg.learned.training.steps.schedule import make_optimizer, rate_at, set_rate, steps_of, trainable
 from hybridreg.learned.training.stop_flag import StopFlag
 
 if TYPE_CHECKING:

@@ -20,9 +20,9 @@ from hybridreg.learned.training.curve_files import CurveFile, Value
 from hybridreg.learned.training.data.opened_source import OpenedSource
 from hybridreg.learned.training.data.samples import Sample
 from hybridreg.learned.training.data.training_examples import Example
-from hybridreg.learned.training.objective import Outcome
 from hybridreg.learned.training.recipe import Phase
 from hybridreg.learned.training.reporting import Reporter
+from hybridreg.learned.training.steps.objective import Outcome
 from hybridreg.learned.training.validation import PROTOCOL, Validation, pair_inlier_ratio, rank, validate
 from hybridreg.learned.weights import save_pretrained
 

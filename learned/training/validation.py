@@ -24,8 +24,8 @@ from hybridreg.learned.pretrained import Pretrained
 from hybridreg.learned.training.data.opened_source import OpenedSource
 from hybridreg.learned.training.data.pair_source import PairSource
 from hybridreg.learned.training.data.samples import Sample, undisturbed
-from hybridreg.learned.training.objective import fine_features
 from hybridreg.learned.training.stage_validation import rows_of
+from hybridreg.learned.training.steps.objective import fine_features
 
 PROTOCOL = protocol("cross3dreg")
 

@@ -18,8 +18,8 @@ from hybridreg.learned.pretrained import Pretrained
 from hybridreg.learned.training.data.augmentation import Augmentation, draw_motions
 from hybridreg.learned.training.data.opened_source import LazyPair, OpenedSource, opened
 from hybridreg.learned.training.data.tensor_cache import Tensors
-from hybridreg.learned.training.objective import Outcome
 from hybridreg.learned.training.recipe import Recipe, Source
+from hybridreg.learned.training.steps.objective import Outcome
 from hybridreg.learned.true_pair import TruePair
 from hybridreg.pair import LabelledPair
 

@@ -10,10 +10,10 @@ import pytest
 import torch
 from training_runs import MakeRecipe, log, options, state
 
-from hybridreg.learned.training import forward_pass
 from hybridreg.learned.training.data.augmentation import Augmentation
 from hybridreg.learned.training.data.frozen import lasting
 from hybridreg.learned.training.recipe import Phase, Recipe
+from hybridreg.learned.training.steps import forward_pass
 from hybridreg.learned.training.training_run import train
 
 UPRIGHT = {"tilt": 0.0, "jitter": 0.0}

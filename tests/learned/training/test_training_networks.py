@@ -18,9 +18,10 @@ from training_runs import log, options, same, state
 from hybridreg import testing
 from hybridreg.geometry import se3
 from hybridreg.learned.network_table import DEFAULT, NETWORKS, network_class
-from hybridreg.learned.training import checkpoint, forward_pass, recipe_file
+from hybridreg.learned.training import checkpoint, recipe_file
 from hybridreg.learned.training.data.training_examples import learn
-from hybridreg.learned.training.objective import Outcome
+from hybridreg.learned.training.steps import forward_pass
+from hybridreg.learned.training.steps.objective import Outcome
 from hybridreg.learned.training.training_run import train
 from hybridreg.learned.true_pair import TruePair
 from hybridreg.learned.weights import from_pretrained

@@ -12,8 +12,8 @@ import pytest
 import torch
 from training_runs import WARM_UP, MakeRecipe, log, options, state
 
-from hybridreg.learned.training import forward_pass
 from hybridreg.learned.training.initial_weights import first_network
+from hybridreg.learned.training.steps import forward_pass
 from hybridreg.learned.training.training_run import train
 
 ALL = {"infonce": 1.0, "coarse": 1.0, "fine": 1.0, "mask": 1.0}

@@ -19,7 +19,7 @@ from hybridreg.learned.network_table import network_class
 from hybridreg.learned.training import recipe_file
 from hybridreg.learned.training.data import data_choice
 from hybridreg.learned.training.recipe import Phase
-from hybridreg.learned.training.schedule import make_optimizer, rate_at, steps_of
+from hybridreg.learned.training.steps.schedule import make_optimizer, rate_at, steps_of
 
 PHASE = {"name": "p", "steps": 2}
 

@@ -14,8 +14,9 @@ from typing import Any
 import pytest
 from training_runs import MakeRecipe, Run, environment, log, options, same, state, write_recipe
 
-from hybridreg.learned.training import checkpoint, forward_pass
-from hybridreg.learned.training.objective import Outcome
+from hybridreg.learned.training import checkpoint
+from hybridreg.learned.training.steps import forward_pass
+from hybridreg.learned.training.steps.objective import Outcome
 from hybridreg.learned.training.training_run import train
 
 

@@ -15,11 +15,12 @@ import torch
 from torch import Tensor
 from training_runs import WARM_UP, MakeRecipe, log, options, same, state
 
-from hybridreg.learned.training import forward_pass, loop
+from hybridreg.learned.training import loop
 from hybridreg.learned.training.initial_weights import first_network
-from hybridreg.learned.training.objective import Outcome
 from hybridreg.learned.training.processes import start_processes
-from hybridreg.learned.training.schedule import make_optimizer
+from hybridreg.learned.training.steps import forward_pass
+from hybridreg.learned.training.steps.objective import Outcome
+from hybridreg.learned.training.steps.schedule import make_optimizer
 from hybridreg.learned.training.training_run import train
 
 PHASE = {"name": "warm-up", "steps": 4, "rate": 1e-3, "losses": WARM_UP}

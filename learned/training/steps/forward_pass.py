@@ -16,8 +16,8 @@ from hybridreg.learned.pyramid.packed import packed
 from hybridreg.learned.training.data.frozen import FrozenFeatures, lasting
 from hybridreg.learned.training.data.samples import Sample
 from hybridreg.learned.training.data.training_examples import Example, learn
-from hybridreg.learned.training.objective import Outcome, objective
 from hybridreg.learned.training.recipe import Phase, Recipe
+from hybridreg.learned.training.steps.objective import Outcome, objective
 
 # Pairs whose clouds go through the backbone at once on a GPU; by hand. On a CPU packing gains nothing.
 AT_ONCE = {"cuda": 32}

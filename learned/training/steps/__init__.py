@@ -1,0 +1,2 @@
+# SPDX-License-Identifier: MIT
+"""One optimiser step: losses, gradients, rate."""
