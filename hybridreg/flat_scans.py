@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybridreg.cloud import PointCloud
-from hybridreg.geometry.extent import reach
+from hybridreg.geometry.extent import reach, sample
 from hybridreg.pair import Pair
 from hybridreg.resolution import default_voxel
 
@@ -24,6 +24,8 @@ Array = NDArray[np.float64]
 # Farthest that nearly all points, and the sensor, lie off the plane of a flat scan: of the cloud's extent; by hand.
 _THIN = 1e-3
 _NEARLY_ALL = 0.98
+# Points that tell whether a scan is flat: a share of them is good to half a percent.
+_TOLD = 5_000
 # The sensor's height over the floor, and the walls' over the sensor: of the smaller cloud's extent; by hand.
 _HEIGHT = 1.0 / 6.0
 # Beams under which floor is drawn, at most; by hand.
@@ -56,17 +58,18 @@ def _normal(cloud: PointCloud) -> Array | None:
     extent = reach(cloud.radii)
     if extent <= 0.0:
         return None
-    rays = cloud.points - (_places(cloud) if len(cloud.seen.places) else cloud.points.mean(axis=0))
+    rows = sample(np.arange(len(cloud)), _TOLD)
+    rays = cloud.points[rows] - (_places(cloud, rows) if len(cloud.seen.places) else cloud.points.mean(axis=0))
     normal: Array = np.linalg.eigh(rays.T @ rays)[1][:, 0]
     normal = normal * np.sign(normal[np.argmax(np.abs(normal))])
     off = np.abs(rays @ normal)
     return normal if float(np.quantile(off, _NEARLY_ALL)) < _THIN * extent else None
 
 
-def _places(cloud: PointCloud) -> Array:
-    # Where each point was seen from, (N, 3) or (1, 3).
+def _places(cloud: PointCloud, rows: NDArray[np.int64]) -> Array:
+    # Where points (k,) were seen from, (k, 3) or (1, 3).
     places, of_point, _ = cloud.seen
-    return places if of_point is None else places[of_point]
+    return places if of_point is None else places[of_point[rows]]
 
 
 def _raised(cloud: PointCloud, up: Array, height: float, step: float, rng: np.random.Generator) -> PointCloud:
@@ -87,7 +90,7 @@ def _raised(cloud: PointCloud, up: Array, height: float, step: float, rng: np.ra
 def _under_beams(cloud: PointCloud, step: float) -> tuple[Array, NDArray[np.int64]]:
     # At every step along each beam, up to where it ended; and the row of its point.
     some = np.sort(np.random.default_rng(0).permutation(len(cloud))[:_BEAMS])
-    places = np.broadcast_to(_places(cloud), cloud.points.shape)[some]
+    places = np.broadcast_to(_places(cloud, some), (len(some), 3))
     beams = cloud.points[some] - places
     length = np.linalg.norm(beams, axis=1)
     n = (length / step).astype(np.int64)
