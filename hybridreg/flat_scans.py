@@ -59,7 +59,9 @@ def _normal(cloud: PointCloud) -> Array | None:
     if extent <= 0.0:
         return None
     rows = sample(np.arange(len(cloud)), _TOLD)
-    rays = cloud.points[rows] - (_places(cloud, rows) if len(cloud.seen.places) else cloud.points.mean(axis=0))
+    rays = cloud.points[rows] - (
+        _places(cloud, rows) if len(cloud.seen.places) else cloud.points.mean(axis=0)
+    )
     normal: Array = np.linalg.eigh(rays.T @ rays)[1][:, 0]
     normal = normal * np.sign(normal[np.argmax(np.abs(normal))])
     off = np.abs(rays @ normal)

@@ -19,6 +19,7 @@ from hybridreg.matches import Correspondences, Pose
 from hybridreg.scene import Scene
 from hybridreg.search.settle import settle
 from hybridreg.verdict import Judgement, judge
+from hybridreg.verdict.training.near_misses import ASIDE, aside, table
 
 NONE = Correspondences.none()
 
@@ -57,17 +58,6 @@ def test_a_slide_along_the_street_is_not_ok(crossing: Made, metres: float) -> No
     assert judge(crossing.scene, Pose(slid), NONE).verdict != "ok"
 
 
-def aside(
-    scene: Scene, truth: np.ndarray, degrees: float, metres: float, rng: np.random.Generator
-) -> np.ndarray:
-    """The true pose, turned about the vertical and shifted at the middle of the source."""
-    middle = se3.apply(truth, views.of(scene).middle)[0]
-    direction = rng.normal(size=3) * [1.0, 1.0, 0.1]
-    R = se3.yaw(degrees)[:3, :3]
-    t = middle + metres * direction / np.linalg.norm(direction) - R @ middle
-    return se3.from_rt(R, t) @ truth
-
-
 @pytest.mark.parametrize(
     ("tier", "number"), [("near", 2), ("near", 3), ("far", 0), ("far", 5), ("degenerate", 1)]
 )
@@ -75,16 +65,23 @@ def test_a_pose_just_beyond_the_tolerance_is_not_ok(tier: str, number: int) -> N
     # One that nobody refined lies so near the right one that all evidence speaks for it.
     labelled = open_dataset(f"sim:val/{tier}")[number]
     scene, truth = VoxelGrid()(labelled.pair), lower_pose(labelled.T_target_source, labelled.pair)
-    rng = np.random.default_rng(number)
-    for degrees, metres in ((2.6, 0.0), (4.0, 0.0), (0.0, 0.6), (0.0, 0.8), (0.0, 1.6), (1.5, 0.7)):
-        judgement = judge(scene, Pose(aside(scene, truth, degrees, metres, rng)), NONE)
+    rng, middle = np.random.default_rng(number), views.of(scene).middle[0]
+    for degrees, metres in ASIDE[1:]:
+        judgement = judge(scene, Pose(aside(truth, middle, degrees, metres, rng)), NONE)
         assert judgement.verdict != "ok", (degrees, metres, words(judgement))
+
+
+def test_near_misses_are_counted_by_how_far_they_lie() -> None:
+    lines = table([(ASIDE[1], True), (ASIDE[1], False), (ASIDE[3], False)]).splitlines()
+    assert lines[3] == "| 2.6 | 0 | 2 | 1 |"
+    assert lines[5] == "| 0 | 0.6 | 1 | 0 |"
 
 
 def test_how_far_the_surfaces_draw_a_pose_is_told() -> None:
     labelled = open_dataset("sim:val/near")[2]
     scene, truth = VoxelGrid()(labelled.pair), lower_pose(labelled.T_target_source, labelled.pair)
-    judgement = judge(scene, Pose(aside(scene, truth, 0.0, 0.6, np.random.default_rng(0))), NONE)
+    pose = aside(truth, views.of(scene).middle[0], 0.0, 0.6, np.random.default_rng(0))
+    judgement = judge(scene, Pose(pose), NONE)
     assert judgement.verdict == "doubtful"
     assert re.match(r"the surfaces draw the pose 0\.\d deg and 0\.(5|6)\d? m away", judgement.reasons[0])
 
