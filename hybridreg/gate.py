@@ -90,7 +90,9 @@ def rounded(points: Array, name: str) -> None:
     with np.errstate(over="ignore"):
         single = some.astype(np.float32)
     kept_so = (single == some).all(axis=0)
-    step = float(np.where(kept_so, np.spacing(np.abs(single).max(axis=0, initial=0.0)), 0.0).max())
+    # Where most points lie: a stray one may be anywhere.
+    away = np.median(np.abs(single), axis=0) if len(single) else np.zeros(single.shape[1], np.float32)
+    step = float(np.where(kept_so, np.spacing(away.astype(np.float32)), 0.0).max())
     if step > _COARSE:
         warnings.warn(
             f"{name}: its coordinates were kept in single precision far from the origin, {step:.2g} m apart; export "

@@ -171,3 +171,11 @@ def test_a_sensor_frame_in_single_precision_is_fine() -> None:
 def test_an_open_file_is_refused_with_a_cure() -> None:
     with pytest.raises(ValueError, match=r"pass what its read\(\) returns"):
         PointCloud.of(io.BytesIO(b"ply"))
+
+
+def test_a_stray_point_far_away_is_no_map() -> None:
+    points = np.random.default_rng(0).uniform(-20.0, 20.0, (200, 3)).astype(np.float32)
+    points[3] = [8e5, 2e6, -4e4]
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        PointCloud.of(points, name="scan")
