@@ -90,7 +90,13 @@ class Build:
 def pairs(data: Sequence[str], seeds: Sequence[int], kinds: Sequence[str], yaws: int) -> Iterator[Sample]:
     """Pairs of data sets, each `yaws` times with its source turned about z, or as it is for 0; and hard kinds."""
     for name in data:
-        for k, one in enumerate(open_dataset(name)):
+        dataset = open_dataset(name)
+        for k in range(len(dataset)):
+            try:
+                one = dataset[k]
+            except ValueError as error:  # a cloud of too few points
+                print(f"{dataset.ids[k]}: left out: {error}", flush=True)
+                continue
             given = Sample.of(one, name, hopeless="disjoint" in name)
             for yaw in np.random.default_rng(k).uniform(0.0, 360.0, yaws) if yaws else [0.0]:
                 T = se3.yaw(float(yaw))
