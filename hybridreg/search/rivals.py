@@ -13,7 +13,7 @@ from hybridreg.scene import Scene
 from hybridreg.search import settle
 from hybridreg.search.axis_turns import TURNS, poses
 from hybridreg.search.hypothesis import Hypothesis, as_hypotheses, parted, seen_at
-from hybridreg.search.ranking import best, differs, with_matches
+from hybridreg.search.ranking import best, differs, distinct, with_matches
 from hybridreg.search.repeats import copies
 
 Array = NDArray[np.float64]
@@ -50,8 +50,8 @@ def find(scene: Scene, own: Hypothesis, pose: Pose) -> list[Hypothesis]:
     guessed += [T for T in turned[:_FULLEST] if is_rival(T)]
     moved = seen_at(scene, settle.settle(views, np.array(guessed).reshape(-1, 4, 4)), _CLOSE)
     rivals = [*(one for one in likeliest if one.settled), *moved]
-    # Guesses that come back to the pose are no rivals, and must not hide those behind them.
-    apart = best(with_matches(scene, one) for one in rivals if is_rival(one.T))[:_ENOUGH]
+    # Guesses that come back to the pose are no rivals, nor are two that meet; neither must hide those behind them.
+    apart = distinct(scene, (with_matches(scene, one) for one in rivals if is_rival(one.T)))[:_ENOUGH]
 
     def came_to_rest(one: Hypothesis) -> bool:
         # Where surfaces hold a pose loosely, a rival may have stopped on its way to it.

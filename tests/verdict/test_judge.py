@@ -2,6 +2,7 @@
 from __future__ import annotations
 
 import re
+from itertools import combinations
 
 import numpy as np
 import pytest
@@ -17,6 +18,7 @@ from hybridreg.frames import lower_pose
 from hybridreg.geometry import se3
 from hybridreg.matches import Correspondences, Pose
 from hybridreg.scene import Scene
+from hybridreg.search.ranking import differs
 from hybridreg.search.settle import settle
 from hybridreg.verdict import Judgement, judge
 from hybridreg.verdict.training.near_misses import ASIDE, aside, table
@@ -132,6 +134,14 @@ def test_a_rival_that_stopped_on_its_way_to_the_pose_is_none() -> None:
     assert metrics.rre_deg(result.transformation, made.T_target_source) < 0.5
     assert result.verdict == "ok"
     assert len(result.rivals) == 0
+
+
+def test_two_rivals_that_meet_are_one() -> None:
+    trace = hr.Pipeline.preset("default").trace(open_dataset("sim:val/mid")[4].pair)
+    both, found = views.of(trace.scene), trace.refined.weighed.rivals
+    assert len(found) == 4
+    middle = se3.apply(trace.refined.T, both.middle)[0]
+    assert all(differs(one.T, other.T, middle, both.spacing) for one, other in combinations(found, 2))
 
 
 def test_no_pose_is_failed(crossing: Made) -> None:
