@@ -23,6 +23,8 @@ _DISTRIBUTIONS: dict[str, tuple[str, str, tuple[int, int] | None]] = {
     "imagecodecs": ("imagecodecs", "pcd", None),
     "laspy": ("laspy", "las", None),
     "lightning_fabric": ("lightning-fabric", "train", None),
+    "mcap": ("mcap", "ros", None),
+    "mcap_protobuf": ("mcap-protobuf-support", "ros", None),
     "matplotlib": ("matplotlib", "report", None),
     "open3d": ("open3d", "open3d", None),
     "plotly": ("plotly", "report", None),

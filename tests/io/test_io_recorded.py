@@ -10,12 +10,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 import hybridreg as hr
 from hybridreg.geometry import se3
 from hybridreg.io import read_points, read_recorded
 from hybridreg.io.recorded import livox_message
-from hybridreg.io.recorded.recording import Selection
+from hybridreg.io.recorded.recording import ANY, Selection
 
 HUNDRED = np.random.default_rng(3).integers(-4000, 4000, (100, 3)) / 64.0
 
@@ -442,3 +443,90 @@ def test_compressed_pcd_is_the_same_with_and_without_its_wheel(monkeypatch: pyte
             lzf.lzf_decompress(part, size)
     monkeypatch.setattr(lzf, "_by_imagecodecs", lambda *_: (_ for _ in ()).throw(ImportError()))
     assert lzf.lzf_decompress(packed, len(data)) == data
+
+
+def write_foxglove(path: Path, clouds: list[np.ndarray], poses: list[np.ndarray], kind: str = "f4") -> Path:
+    """An MCAP file as Foxglove's own tools write it: clouds 0.1 s apart on /lidar, and a log on /log."""
+    writer = pytest.importorskip("mcap_protobuf.writer").Writer
+    schemas = pytest.importorskip("foxglove_schemas_protobuf")
+    import importlib
+
+    of = {
+        name: getattr(importlib.import_module(f"{schemas.__name__}.{name}_pb2"), name)
+        for name in ("PointCloud", "Log")
+    }
+    code = {"i2": 4, "f4": 7, "f8": 8}[kind]
+    size = np.dtype(kind).itemsize
+    with path.open("wb") as file, writer(file) as out:
+        for k, (cloud, T) in enumerate(zip(clouds, poses, strict=True)):
+            message = of["PointCloud"](frame_id="lidar", point_stride=4 * size)
+            for row, name in enumerate(("intensity", "z", "y", "x")):
+                message.fields.add(name=name, offset=row * size, type=code)
+            message.data = (
+                np.column_stack([np.zeros(len(cloud)), cloud[:, ::-1]]).astype(f"<{kind}").tobytes()
+            )
+            p, q = message.pose.position, message.pose.orientation
+            p.x, p.y, p.z = T[:3, 3]
+            if not np.array_equal(T, np.eye(4)):
+                q.x, q.y, q.z, q.w = Rotation.from_matrix(T[:3, :3]).as_quat()
+            when = 10**9 + k * 10**8
+            out.write_message("/lidar", message, log_time=when, publish_time=when)
+        out.write_message("/log", of["Log"](message="stop"), log_time=when, publish_time=when)
+    return path
+
+
+@pytest.mark.parametrize("kind", ["i2", "f4", "f8"])
+def test_clouds_of_foxglove(kind: str, tmp_path: Path) -> None:
+    clouds = [np.round(HUNDRED) + k for k in range(3)]
+    path = write_foxglove(tmp_path / "a.mcap", clouds, [np.eye(4)] * 3, kind)
+    for k in range(3):
+        found = read_recorded(path, Selection(index=k))
+        np.testing.assert_array_equal(found.points, clouds[k])
+        assert found.places is None
+    np.testing.assert_array_equal(hr.read(path, topic="/lidar", at=0.15).points, clouds[2])
+    np.testing.assert_array_equal(hr.read(path, index=1, accumulate=2).points, np.vstack(clouds[1:]))
+
+
+def test_a_cloud_of_foxglove_comes_to_its_frame_with_its_viewpoint(tmp_path: Path) -> None:
+    T = se3.from_rt(se3.rotation_about(np.array([0.1, 0.2, 0.5])), np.array([1.0, -2.0, 1.6]))
+    path = write_foxglove(tmp_path / "a.mcap", [HUNDRED, HUNDRED], [T, np.eye(4)], "f8")
+    one = read_recorded(path, ANY)
+    np.testing.assert_allclose(one.points, se3.apply(T, HUNDRED), atol=1e-9)
+    np.testing.assert_allclose(one.places, T[:3, 3][None])
+    both = read_recorded(path, Selection(accumulate=2))
+    np.testing.assert_allclose(both.points[100:], HUNDRED, atol=1e-9)
+    np.testing.assert_allclose(both.places, [T[:3, 3], np.zeros(3)])
+    assert both.of_point is not None
+    assert both.of_point.tolist() == [0] * 100 + [1] * 100
+
+
+@pytest.mark.parametrize(
+    "asked, told",
+    [
+        (Selection(topic="/radar"), r"no clouds of the topic '/radar'; it has /lidar \(2\)"),
+        (Selection(index=2), "holds 2 clouds of this topic, index 2 was asked for; choose from 0 to 1"),
+        (Selection(at=60.0), "holds 0 clouds of this topic from 60 s on"),
+    ],
+)
+def test_what_a_file_of_foxglove_lacks_is_told(asked: Selection, told: str, tmp_path: Path) -> None:
+    path = write_foxglove(tmp_path / "a.mcap", [HUNDRED, HUNDRED], [np.eye(4)] * 2)
+    with pytest.raises(ValueError, match=told):
+        read_recorded(path, asked)
+
+
+def test_an_mcap_file_without_clouds_or_cut_off_says_so(tmp_path: Path) -> None:
+    writer = pytest.importorskip("mcap.writer").Writer
+    path = tmp_path / "a.mcap"
+    with path.open("wb") as file:
+        out = writer(file)
+        out.start(profile="", library="test")
+        schema = out.register_schema("sensor_msgs/msg/PointCloud2", "ros2msg", b"")
+        channel = out.register_channel("/points", "cdr", schema)
+        out.add_message(channel, 0, b"", 0)
+        out.finish()
+    with pytest.raises(ValueError, match="holds no clouds, but sensor_msgs/msg/PointCloud2 in cdr"):
+        read_recorded(path, ANY)
+    whole = write_foxglove(tmp_path / "b.mcap", [HUNDRED], [np.eye(4)]).read_bytes()
+    (tmp_path / "cut.mcap").write_bytes(whole[: len(whole) // 2])
+    with pytest.raises(ValueError, match=r"cut\.mcap"):
+        read_recorded(tmp_path / "cut.mcap", ANY)

@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 
 from hybridreg.io.faults import fault, foreign_parser
 from hybridreg.io.recorded import livox_message, ros_messages
-from hybridreg.io.recorded.recording import Recorded, Selection
+from hybridreg.io.recorded.foxglove_clouds import is_ros, read_foxglove
+from hybridreg.io.recorded.recording import Recorded, Selection, chosen_topic
 from hybridreg.runtime.optional_packages import load
 
 Array = NDArray[np.float64]
@@ -27,7 +28,8 @@ _NANOSECONDS = 1e9
 
 
 def read_bag(path: Path, selection: Selection) -> Recorded:
-    """Read clouds of one topic: `sensor_msgs/PointCloud2` of any layout, and Livox's `CustomMsg`.
+    """Read clouds of one topic: `sensor_msgs/PointCloud2` of any layout, Livox's `CustomMsg`, and `foxglove.PointCloud`
+    of MCAP files that no ROS wrote.
 
     Parameters
     ----------
@@ -40,6 +42,8 @@ def read_bag(path: Path, selection: Selection) -> Recorded:
     ImportError
         Without rosbags.
     """
+    if path.suffix == ".mcap" and path.is_file() and not is_ros(path):
+        return read_foxglove(path, selection)
     name = str(path)
     anyreader = load("rosbags.highlevel", f"{name}: a bag").AnyReader
     typesys = load("rosbags.typesys", f"{name}: a bag")
@@ -74,17 +78,11 @@ def _of_topic(reader: Any, topic: str | None, name: str) -> list[Any]:
     for connection in reader.connections:
         if connection.msgtype in (_CLOUD, *_LIVOX):
             found.setdefault(connection.topic, []).append(connection)
-    told = ", ".join(f"{each} ({sum(c.msgcount for c in found[each])})" for each in sorted(found))
-    if not found:
-        others = ", ".join(sorted({c.msgtype for c in reader.connections})[:8]) or "nothing at all"
-        raise fault(
-            name, f"holds no clouds, but {others}", "give a bag with PointCloud2 or Livox's CustomMsg"
-        )
-    if topic is None and len(found) > 1:
-        raise fault(name, f"holds clouds of {len(found)} topics: {told}", 'choose one with topic="..."')
-    if topic is not None and topic not in found:
-        raise fault(name, f"holds no clouds of the topic {topic!r}", f"it has {told}")
-    return found[topic] if topic is not None else next(iter(found.values()))
+    counts = {each: sum(c.msgcount for c in found[each]) for each in found}
+    others = [connection.msgtype for connection in reader.connections]
+    return found[
+        chosen_topic(counts, topic, others, name, "give a bag with PointCloud2 or Livox's CustomMsg")
+    ]
 
 
 def _clouds(reader: Any, chosen: list[Any], name: str) -> Iterator[Array]:

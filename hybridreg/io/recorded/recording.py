@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from numbers import Integral
 from typing import NamedTuple
@@ -73,6 +74,27 @@ class Selection:
 
 
 ANY = Selection()
+
+
+def chosen_topic(
+    counts: Mapping[str, int], asked: str | None, others: Iterable[str], name: str, cure: str
+) -> str:
+    """The topic whose clouds are read, by the number of clouds of each; `others` are the kinds of what else there is.
+
+    Raises
+    ------
+    ValueError
+        There is none, the one asked for is not among them, or there are several and none was asked for.
+    """
+    told = ", ".join(f"{each} ({counts[each]})" for each in sorted(counts))
+    if not counts:
+        rest = ", ".join(sorted(set(others))[:8]) or "nothing at all"
+        raise fault(name, f"holds no clouds, but {rest}", cure)
+    if asked is None and len(counts) > 1:
+        raise fault(name, f"holds clouds of {len(counts)} topics: {told}", 'choose one with topic="..."')
+    if asked is not None and asked not in counts:
+        raise fault(name, f"holds no clouds of the topic {asked!r}", f"it has {told}")
+    return next(iter(counts)) if asked is None else asked
 
 
 class Recorded(NamedTuple):
