@@ -43,8 +43,8 @@ def reasons(
 
     `explained`: a sentence before these says why no pose was found; `started`: the search began at a given start;
     `through_walls`: more of the walls of flat scans is seen through than at any right pose; `slack`: degrees and metres
-    by which a right pose may well be off, where that is more than the tolerance; `drawn`: those by which it is off
-    where the surfaces fit best.
+    by which a right pose may well be off, where that is more than the tolerance; `drawn`: those by which the surfaces
+    draw it to where they fit better.
     """
     if not found:
         instead = "the start" if started else "the identity"

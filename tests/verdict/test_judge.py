@@ -14,6 +14,7 @@ from hybridreg.data import open_dataset
 from hybridreg.data.hard import box_world
 from hybridreg.eval.score import metrics
 from hybridreg.evidence import views
+from hybridreg.evidence.log_odds import FAILED
 from hybridreg.frames import lower_pose
 from hybridreg.geometry import se3
 from hybridreg.matches import Correspondences, Pose
@@ -71,6 +72,16 @@ def test_a_pose_just_beyond_the_tolerance_is_not_ok(tier: str, number: int) -> N
     for degrees, metres in ASIDE[1:]:
         judgement = judge(scene, Pose(aside(truth, middle, degrees, metres, rng)), NONE)
         assert judgement.verdict != "ok", (degrees, metres, words(judgement))
+
+
+def test_a_right_pose_that_nobody_refined_is_not_failed() -> None:
+    labelled = open_dataset("sim:val/degenerate#60")[56]
+    scene, truth = VoxelGrid()(labelled.pair), lower_pose(labelled.T_target_source, labelled.pair)
+    middle = views.of(scene).middle[0]
+    near = [aside(truth, middle, degrees, 0.2, np.random.default_rng(7)) for degrees in (0.5, 1.0, 1.5)]
+    told = [judge(scene, Pose(T), NONE) for T in near]
+    assert [each.verdict for each in told].count("failed") == 0
+    assert any(each.confidence == FAILED and "refine it" in each.reasons[0] for each in told)
 
 
 def test_near_misses_are_counted_by_how_far_they_lie() -> None:
