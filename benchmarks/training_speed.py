@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Pairs a second that training takes on this machine: one process on the CPU, one and several on a GPU.
 
-``python -m benchmarks.training_speed --processes 1,4 --batch 32`` trains the recipe `warm-up` with each and reads its
-log. Prepared pairs are stored in ``--cache``.
+``python -m benchmarks.training_speed --processes 1,4 --batch 32 --packed 32`` trains the recipe `warm-up` with each and
+reads its log. Prepared pairs are stored in ``--cache``.
 """
 
 from __future__ import annotations
@@ -30,6 +30,7 @@ name = "speed"
 steps = {steps}
 rate = 1e-3
 accumulate = {batch}
+packed = {packed}
 losses = {{ infonce = 1.0, coarse = {others}, fine = {others}, mask = 0.0 }}
 """
 
@@ -37,13 +38,14 @@ losses = {{ infonce = 1.0, coarse = {others}, fine = {others}, mask = 0.0 }}
 def main(
     processes: str = "1",
     batch: int = 8,
+    packed: int = 1,
     cache: Path = Path("runs/prepared"),
     workers: int = 2,
     matching: bool = False,
 ) -> None:
     """Print a Markdown table; ``--matching`` trains superpoint and point matching too.
 
-    ``--batch`` is the pairs of a step. On a GPU those of a process go through the backbone at once, 32 at most.
+    ``--batch`` is the pairs of a step, ``--packed`` how many of them go through the backbone at once.
     """
     recipe = _RECIPE.format(half=_STEPS // 2, pairs=_PAIRS, steps=_STEPS, batch=batch, others=float(matching))
     kinds = [("cpu", 1)]

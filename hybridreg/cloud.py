@@ -103,7 +103,8 @@ class PointCloud:
             return x if said is None else replace(x, said=said.less(x.offset))
         recorded, place = Recorded(np.empty((0, 3))), None
         if isinstance(x, (str, os.PathLike)):
-            recorded, place = read_recorded(x, select), read_viewpoint(x)
+            recorded = read_recorded(x, select)
+            place = recorded.guess if recorded.guess is not None else read_viewpoint(x)
         raw = recorded.points if isinstance(x, (str, os.PathLike)) else gate.coordinates(x, name)
         drop = nonfinite == "drop" or recorded.holed
         kept, rows = gate.finite(raw, name, drop=drop)

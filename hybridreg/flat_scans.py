@@ -24,7 +24,7 @@ Array = NDArray[np.float64]
 # Farthest that nearly all points, and the sensor, lie off the plane of a flat scan: of the cloud's extent; by hand.
 _THIN = 1e-3
 _NEARLY_ALL = 0.98
-# Points that tell whether a scan is flat: a share of them is good to half a percent.
+# Points that tell whether a scan is flat: a share that is estimated from them is within half a percent.
 _TOLD = 5_000
 # The sensor's height over the floor, and the walls' over the sensor: of the smaller cloud's extent; by hand.
 _HEIGHT = 1.0 / 6.0

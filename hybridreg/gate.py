@@ -90,8 +90,9 @@ def rounded(points: Array, name: str) -> None:
     with np.errstate(over="ignore"):
         single = some.astype(np.float32)
     kept_so = (single == some).all(axis=0)
-    # Where most points lie: a stray one may be anywhere.
-    away = np.median(np.abs(single), axis=0) if len(single) else np.zeros(single.shape[1], np.float32)
+    # Where most points lie: a stray one may be anywhere, and missing returns lie at zero.
+    there = np.abs(single[single.any(axis=1)])
+    away = np.median(there, axis=0) if len(there) else np.zeros(3)
     step = float(np.where(kept_so, np.spacing(away.astype(np.float32)), 0.0).max())
     if step > _COARSE:
         warnings.warn(

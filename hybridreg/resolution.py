@@ -76,6 +76,10 @@ class Tolerance(NamedTuple):
     degrees: float
     metres: float
 
+    def within(self, allowed: Tolerance) -> bool:
+        """Whether neither exceeds what is allowed."""
+        return self.degrees <= allowed.degrees and self.metres <= allowed.metres
+
 
 # The paper's own, for vehicle sensors (arXiv 2509.06456, section 4.1).
 VEHICLES = Tolerance(2.0, 0.5)

@@ -155,6 +155,7 @@ def test_pickles() -> None:
 @pytest.mark.parametrize("dtype, told", [("f4", True), ("f8", False)])
 def test_map_coordinates_in_single_precision_are_told(dtype: str, told: bool) -> None:
     points = np.random.default_rng(0).uniform(-20.0, 20.0, (200, 3)) + [4e5, 5.3e6, 500.0]
+    points = np.vstack([points, np.zeros((300, 3))])  # missing returns
     with warnings.catch_warnings(record=True) as seen:
         warnings.simplefilter("always")
         PointCloud.of(points.astype(dtype), name="map")

@@ -50,7 +50,7 @@ def find(scene: Scene, own: Hypothesis, pose: Pose) -> list[Hypothesis]:
     guessed += [T for T in turned[:_FULLEST] if is_rival(T)]
     moved = seen_at(scene, settle.settle(views, np.array(guessed).reshape(-1, 4, 4)), _CLOSE)
     rivals = [*(one for one in likeliest if one.settled), *moved]
-    # Guesses that come back to the pose are no rivals, nor are two that meet; neither must hide those behind them.
+    # Guesses that come back to the pose are no rivals, and two that meet are one; neither must hide those behind them.
     apart = distinct(scene, (with_matches(scene, one) for one in rivals if is_rival(one.T)))[:_ENOUGH]
 
     def came_to_rest(one: Hypothesis) -> bool:

@@ -103,7 +103,7 @@ def _elsewhere(drawn: Tolerance | None) -> Iterator[str]:
     if drawn is not None:
         yield (
             f"the surfaces draw the pose {drawn.degrees:.1f} deg and {drawn.metres:.2g} m away, where they fit better; "
-            'if it was not refined, refine it: refine="gicp" (--set refine=gicp)'
+            'if it was not refined, refine it: pipeline.swap(refine="gicp") (--set refine=gicp)'
         )
 
 

@@ -35,9 +35,9 @@ def all_at_once(
     """As `group_norm`, in as many steps for a hundred clouds as for one: clouds are padded to the longest's rows."""
     rows = _Rows.of(lengths, features.device)
     mean = rows.mean(features, groups)
-    variance = rows.mean((features - mean[rows.cloud]).square(), groups)
+    variance = rows.mean((features - rows.spread(mean)).square(), groups)
     scale = (variance + _EPS).rsqrt() * weight
-    out = torch.addcmul((bias - mean * scale)[rows.cloud], features, scale[rows.cloud])
+    out = torch.addcmul(rows.spread(bias - mean * scale), features, rows.spread(scale))
     return out if slope == 1.0 else F.leaky_relu(out, slope)
 
 
@@ -52,9 +52,9 @@ class _Rows:
 
     def __init__(self, lengths: tuple[int, ...], device: torch.device) -> None:
         counts = torch.tensor(lengths)
-        self.cloud = torch.arange(len(lengths)).repeat_interleave(counts).to(device)
+        self._cloud = torch.arange(len(lengths)).repeat_interleave(counts).to(device)
         starts = counts.cumsum(0) - counts
-        self._place = torch.arange(int(counts.sum())).to(device) - starts.to(device)[self.cloud]
+        self._place = torch.arange(int(counts.sum())).to(device) - starts.to(device)[self._cloud]
         self._counts, self._longest = counts.clamp_min(1).to(device)[:, None], max(lengths)
 
     @staticmethod
@@ -62,10 +62,14 @@ class _Rows:
     def of(lengths: tuple[int, ...], device: torch.device) -> _Rows:
         return _Rows(lengths, device)
 
+    def spread(self, values: Tensor) -> Tensor:
+        """Each cloud's row of (clouds, C) for each of its points."""
+        return values.index_select(0, self._cloud)  # the gradient of values[index] would sort the index
+
     def mean(self, features: Tensor, groups: int) -> Tensor:
         """Mean (clouds, C) of each cloud over its rows and the channels of a group."""
         block = features.new_zeros(len(self._counts), self._longest, features.shape[1])
-        block = block.index_put((self.cloud, self._place), features)
+        block = block.index_put((self._cloud, self._place), features)
         by_channel = block.sum(1) / self._counts
         return (
             by_channel.view(len(by_channel), groups, -1)

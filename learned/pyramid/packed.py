@@ -17,7 +17,7 @@ def packed(pyramids: Sequence[Pyramid]) -> Pyramid:
     lengths = tuple(tuple(n for each in pyramids for n in each.lengths[stage]) for stage in stages)
 
     def rows(indices: Sequence[Tensor], stage: int) -> Tensor:
-        # The padding index is the number of rows: of each pyramid before, of all of them after.
+        # The padding index is a number of rows: the pyramid's own as it comes, that of all together in the pack.
         counts = [sum(each.lengths[stage]) for each in pyramids]
         moved, first = [], 0
         for index, count in zip(indices, counts, strict=True):

@@ -34,11 +34,13 @@ class PyramidPlan(Protocol):
 
 @dataclass(frozen=True, kw_only=True)
 class Pyramid:
-    """Both clouds stacked, target first, at every stage; neighbours never cross clouds. Of several pairs after one
-    another: `hybridreg.learned.pyramid.packed`."""
+    """Both clouds stacked, target first, at every stage; neighbours never cross clouds.
+
+    `hybridreg.learned.pyramid.packed` stacks those of several pairs.
+    """
 
     points: tuple[Tensor, ...]  # stage s: (N_s, 3) float32, metres
-    lengths: tuple[tuple[int, ...], ...]  # stage s: points of the target, points of the source
+    lengths: tuple[tuple[int, ...], ...]  # stage s: points of each cloud
     neighbors: tuple[Tensor, ...]  # stage s: (N_s, k_s) int64 into stage s, pad N_s
     subsampling: tuple[Tensor, ...]  # stage s+1's points: (N_{s+1}, k_s) int64 into stage s, pad N_s
     upsampling: tuple[Tensor, ...]  # stage s: (N_s,) int64, the nearest point of stage s+1, or pad N_{s+1}

@@ -59,6 +59,10 @@ class Loop:
             optimizer = make_optimizer(phase, self.network)
             if optimizer_state is not None:
                 optimizer.load_state_dict(optimizer_state)
+                for (
+                    group
+                ) in optimizer.param_groups:  # how it steps is this build's matter, not the checkpoint's
+                    group.update({key: optimizer.defaults[key] for key in ("fused", "foreach")})
                 optimizer_state = None
             if not self._run_phase(phase, optimizer):
                 return False
@@ -95,7 +99,7 @@ class Loop:
         # Gradients of this process's share of the batch; 1 in the result where a loss was not finite.
         bad = torch.zeros(batch, device=self.fabric.device)
         mine = range(self.fabric.global_rank, batch, self.fabric.world_size)
-        for places in losses.groups(mine, self.fabric.device):
+        for places in losses.groups(mine):
             with self.record.data_time():
                 found = [next(upcoming) for _ in places]
             assert [each.number for each in found] == [first + place for place in places]
@@ -103,9 +107,10 @@ class Loop:
                 if isinstance(each, Unusable):
                     _log.warning("pair %s cannot be used: %s", each.id, each.problem)
                     bad[place] = 1.0
-            here = [each.to(self.fabric.device) for each in found if not isinstance(each, Unusable)]
-            if len(here) < len(found):
+            usable = [each for each in found if not isinstance(each, Unusable)]
+            if len(usable) < len(found):
                 continue  # a step with a bad pair is skipped as a whole
+            here = [each.to(self.fabric.device) for each in usable]
             with self.fabric.autocast():
                 outcomes = list(losses(here, [samples.order[each.number] for each in here]))
             totals = torch.stack([outcome.total for outcome in outcomes])

@@ -83,6 +83,7 @@ class Phase:
     backbone_rate : factor on the rate of the backbone; 0 freezes it
     data : weights of sources by name, instead of their own; sources left out are not used
     accumulate : pairs of one optimiser step, over all processes together
+    packed : pairs whose clouds go through the backbone at once, for a GPU; the gradients are the same but for rounding
     use_predicted : how often a step sees the predicted overlap mask (docs/methods.md 5.4)
     """
 
@@ -101,6 +102,7 @@ class Phase:
     backbone_rate: float = 1.0
     data: Mapping[str, float] = field(default_factory=dict)
     accumulate: int = 1
+    packed: int = 1
     use_predicted: float = 0.0
 
     def __post_init__(self) -> None:
@@ -110,6 +112,8 @@ class Phase:
             raise ValueError(f"phase {self.name!r}: decay='step' needs decay_every above 0")
         if self.accumulate < 1:
             raise ValueError(f"phase {self.name!r}: accumulate={self.accumulate} must be at least 1")
+        if self.packed < 1:
+            raise ValueError(f"phase {self.name!r}: packed={self.packed} must be at least 1")
         if not 0.0 <= self.momentum < 1.0:
             raise ValueError(f"phase {self.name!r}: momentum={self.momentum} must be at least 0 and below 1")
 
@@ -158,6 +162,11 @@ class Recipe:
                 )
             if self.kind != DEFAULT:
                 self._check_other(phase)
+            elif phase.packed > 1 and self.network.backbone.norm_scope != "per_cloud":
+                raise ValueError(
+                    f"phase {phase.name!r}: packed={phase.packed} would normalise several pairs as one; "
+                    'choose packed=1, or network.backbone.norm_scope="per_cloud"'
+                )
             elif phase.losses.mask and self.network.omp is None and phase.losses.mask != 1.0:
                 raise ValueError(f"phase {phase.name!r}: a mask loss is weighed, but the network has no OMP")
         vgam = self.network.vgam if self.kind == DEFAULT else None
@@ -172,6 +181,10 @@ class Recipe:
             raise ValueError(
                 f"phase {phase.name!r}: losses has the parts of {DEFAULT}'s loss; {self.kind} weighs its own in "
                 "[network.loss]"
+            )
+        if phase.packed > 1:
+            raise ValueError(
+                f"phase {phase.name!r}: packed is about {DEFAULT}'s backbone; {self.kind} has its own"
             )
         if phase.use_predicted:
             raise ValueError(

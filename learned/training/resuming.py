@@ -22,13 +22,19 @@ def check_same(now: Mapping[str, Any], then: Mapping[str, Any], phase: int) -> N
     """
     pairs = {name: (now.get(name), then.get(name, now.get(name))) for name in _SHAPING}
     pairs["data.train"] = (now["data"]["train"], then["data"]["train"])
-    pairs[f"phase[:{phase + 1}]"] = (now["phase"][: phase + 1], then["phase"][: phase + 1])
+    done = [[_shaping(each) for each in recipe["phase"][: phase + 1]] for recipe in (now, then)]
+    pairs[f"phase[:{phase + 1}]"] = (done[0], done[1])
     different = [name for name, (a, b) in pairs.items() if a != b]
     if different:
         raise ValueError(
             f"the checkpoint comes from a recipe with another {', '.join(different)}; resume with its own recipe, "
             "or begin in another folder"
         )
+
+
+def _shaping(phase: Mapping[str, Any]) -> dict[str, Any]:
+    # Without what may differ between machines.
+    return {name: value for name, value in phase.items() if name != "packed"}
 
 
 def tell_changed_data(then: Mapping[str, str], now: Mapping[str, str]) -> None:

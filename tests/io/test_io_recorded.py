@@ -482,22 +482,22 @@ def test_clouds_of_foxglove(kind: str, tmp_path: Path) -> None:
     for k in range(3):
         found = read_recorded(path, Selection(index=k))
         np.testing.assert_array_equal(found.points, clouds[k])
-        assert found.places is None
+        assert found.guess is None
     np.testing.assert_array_equal(hr.read(path, topic="/lidar", at=0.15).points, clouds[2])
     np.testing.assert_array_equal(hr.read(path, index=1, accumulate=2).points, np.vstack(clouds[1:]))
 
 
 def test_a_cloud_of_foxglove_comes_to_its_frame_with_its_viewpoint(tmp_path: Path) -> None:
     T = se3.from_rt(se3.rotation_about(np.array([0.1, 0.2, 0.5])), np.array([1.0, -2.0, 1.6]))
-    path = write_foxglove(tmp_path / "a.mcap", [HUNDRED, HUNDRED], [T, np.eye(4)], "f8")
-    one = read_recorded(path, ANY)
+    holed = np.vstack([HUNDRED, np.zeros((30, 3))])  # as drivers write missing returns
+    path = write_foxglove(tmp_path / "a.mcap", [holed, HUNDRED], [T, np.eye(4)], "f8")
+    one = hr.read(path)
     np.testing.assert_allclose(one.points, se3.apply(T, HUNDRED), atol=1e-9)
-    np.testing.assert_allclose(one.places, T[:3, 3][None])
+    assert one.dropped == 30
+    np.testing.assert_allclose(read_recorded(path, ANY).guess, T[:3, 3])
     both = read_recorded(path, Selection(accumulate=2))
-    np.testing.assert_allclose(both.points[100:], HUNDRED, atol=1e-9)
-    np.testing.assert_allclose(both.places, [T[:3, 3], np.zeros(3)])
-    assert both.of_point is not None
-    assert both.of_point.tolist() == [0] * 100 + [1] * 100
+    np.testing.assert_allclose(both.points[130:], HUNDRED, atol=1e-9)
+    assert both.guess is None
 
 
 @pytest.mark.parametrize(
@@ -505,7 +505,7 @@ def test_a_cloud_of_foxglove_comes_to_its_frame_with_its_viewpoint(tmp_path: Pat
     [
         (Selection(topic="/radar"), r"no clouds of the topic '/radar'; it has /lidar \(2\)"),
         (Selection(index=2), "holds 2 clouds of this topic, index 2 was asked for; choose from 0 to 1"),
-        (Selection(at=60.0), "holds 0 clouds of this topic from 60 s on"),
+        (Selection(at=60.0), "holds 0 clouds of this topic from 60 s on, 1 were asked for; it lasts 0.1 s"),
     ],
 )
 def test_what_a_file_of_foxglove_lacks_is_told(asked: Selection, told: str, tmp_path: Path) -> None:
@@ -528,5 +528,11 @@ def test_an_mcap_file_without_clouds_or_cut_off_says_so(tmp_path: Path) -> None:
         read_recorded(path, ANY)
     whole = write_foxglove(tmp_path / "b.mcap", [HUNDRED], [np.eye(4)]).read_bytes()
     (tmp_path / "cut.mcap").write_bytes(whole[: len(whole) // 2])
-    with pytest.raises(ValueError, match=r"cut\.mcap"):
+    with pytest.raises(ValueError, match=r"cut\.mcap: cannot be read as an MCAP file"):
         read_recorded(tmp_path / "cut.mcap", ANY)
+    with (tmp_path / "C.MCAP").open("wb") as file:
+        out = writer(file, use_statistics=False)
+        out.start(profile="", library="test")
+        out.finish()
+    with pytest.raises(ValueError, match="has no index; write it to its end"):
+        read_recorded(tmp_path / "C.MCAP", ANY)

@@ -40,9 +40,9 @@ def read_bag(path: Path, selection: Selection) -> Recorded:
     ValueError
         No topic of clouds, several and none chosen, or a message that is not there: each is told with what there is.
     ImportError
-        Without rosbags.
+        Without rosbags, or mcap.
     """
-    if path.suffix == ".mcap" and path.is_file() and not is_ros(path):
+    if path.suffix.lower() == ".mcap" and path.is_file() and not is_ros(path):
         return read_foxglove(path, selection)
     name = str(path)
     anyreader = load("rosbags.highlevel", f"{name}: a bag").AnyReader

@@ -105,9 +105,11 @@ class Recorded(NamedTuple):
         does not tell
     of_point : (N,) row of each point's place, where there are several
     holed : whether missing returns are part of the format, so that they are left out without being asked
+    guess : (3,) where its sensor may have stood, to be tested like an origin
     """
 
     points: Array
     places: Array | None = None
     of_point: NDArray[np.int64] | None = None
     holed: bool = False
+    guess: Array | None = None

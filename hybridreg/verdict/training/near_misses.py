@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """How often is a pose called "ok" that lies just beyond the tolerance, as one that nobody refined may?
 
-    python -m hybridreg.verdict.training.near_misses --data ../shared/data/real sim:val/near#10 sim:val/degenerate#10
+    python -m hybridreg.verdict.training.near_misses
 
 The true pose of every pair, turned and shifted at the middle of the source: about the vertical or any axis, in any
 direction, mostly a level one. A table: how far beside the true pose, how many poses, how many of them "ok".
@@ -28,6 +28,7 @@ Array = NDArray[np.float64]
 # Degrees and metres, for vehicles' sensors; the first is the true pose.
 ASIDE = ((0.0, 0.0), (2.6, 0.0), (4.0, 0.0), (0.0, 0.6), (0.0, 0.8), (0.0, 1.1), (0.0, 1.6), (1.5, 0.7))
 _LEVEL = (1.0, 1.0, 0.15)
+_DATA = ("../shared/data/real", "sim:val/near#10", "sim:val/far#10", "sim:val/degenerate#12")
 
 
 def aside(truth: Array, middle: Array, degrees: float, metres: float, rng: np.random.Generator) -> Array:
@@ -63,7 +64,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("--data", nargs="+", default=["sim:val/near#10", "sim:val/degenerate#10"])
+    parser.add_argument("--data", nargs="+", default=_DATA)
     print(table([each for data in parser.parse_args().data for each in judged(data)]))
 
 

@@ -19,9 +19,6 @@ from hybridreg.learned.training.data.training_examples import Example, learn
 from hybridreg.learned.training.recipe import Phase, Recipe
 from hybridreg.learned.training.steps.objective import Outcome, objective
 
-# Pairs whose clouds go through the backbone at once on a GPU; by hand. On a CPU packing gains nothing.
-AT_ONCE = {"cuda": 32}
-
 
 class ForwardPass:
     """Losses of the samples of a phase; `seed` and a sample's number fix its random choices."""
@@ -33,11 +30,11 @@ class ForwardPass:
             keep = lasting(phase, recipe.augmentation, recipe.network.backbone)
             self._frozen = FrozenFeatures(network, keep)
 
-    def groups(self, places: Sequence[int], device: torch.device) -> list[list[int]]:
+    def groups(self, places: Sequence[int]) -> list[list[int]]:
         """Places of a step's batch, grouped by what is processed at once."""
         if self.network.together:
             return [list(places)]
-        size = AT_ONCE.get(device.type, 1) if self._packs else 1
+        size = self.phase.packed
         return [list(places[first : first + size]) for first in range(0, len(places), size)]
 
     def __call__(self, found: Sequence[Sample | Example], pairs: Sequence[Hashable]) -> Iterator[Outcome]:
@@ -50,12 +47,6 @@ class ForwardPass:
         samples = [each for each in found if isinstance(each, Sample)]
         for sample, known in zip(samples, self._known(samples, pairs), strict=True):
             yield self._of(sample, known)
-
-    @property
-    def _packs(self) -> bool:
-        # Where both clouds of a pair are normalised together, so would be those of a pack.
-        network = self.network
-        return isinstance(network, RegistrationNetwork) and network.config.backbone.norm_scope == "per_cloud"
 
     def _of(self, sample: Sample, known: Known | None) -> Outcome:
         assert isinstance(self.network, RegistrationNetwork)

@@ -13,6 +13,7 @@ import torch
 from training_runs import WARM_UP, MakeRecipe, log, options, state
 
 from hybridreg.learned.training.initial_weights import first_network
+from hybridreg.learned.training.resuming import check_same
 from hybridreg.learned.training.steps import forward_pass
 from hybridreg.learned.training.training_run import train
 
@@ -44,8 +45,7 @@ def test_a_pack_teaches_what_its_pairs_teach_one_by_one(
     monkeypatch.setattr(forward_pass, "packed", watched)
     apart = trained(make_recipe, cache, tmp_path / "apart", losses=losses)
     assert seen == []
-    monkeypatch.setattr(forward_pass, "AT_ONCE", {"cpu": 3})
-    at_once = trained(make_recipe, cache, tmp_path / "packed", losses=losses)
+    at_once = trained(make_recipe, cache, tmp_path / "packed", losses=losses, packed=3)
     assert seen == [3, 3]  # and one pair by itself in each step
     start = first_network(make_recipe()).state_dict()
     one, other = ({name: w - start[name] for name, w in state(out).items()} for out in (apart, at_once))
@@ -67,21 +67,30 @@ def test_a_bad_pair_of_a_pack_is_named_alone(
         nan = outcome.total * float("nan")
         return replace(outcome, total=nan) if sample.number == 1 else outcome
 
-    monkeypatch.setattr(forward_pass, "AT_ONCE", {"cpu": 4})
     monkeypatch.setattr(forward_pass, "objective", spoiled)
-    out = trained(make_recipe, cache, tmp_path / "out", losses=WARM_UP)
+    out = trained(make_recipe, cache, tmp_path / "out", losses=WARM_UP, packed=4)
     assert [line["skipped"] for line in log(out)] == ["1", "1"]
 
 
-def test_pairs_that_are_normalised_together_are_not_packed(
-    make_recipe: MakeRecipe, cache: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def never(pyramids: Any) -> Any:
-        raise AssertionError("a pack would be normalised as one")
-
-    monkeypatch.setattr(forward_pass, "AT_ONCE", {"cpu": 4})
-    monkeypatch.setattr(forward_pass, "packed", never)
+def test_pairs_that_are_normalised_together_are_not_packed(make_recipe: MakeRecipe) -> None:
     network = make_recipe().to_dict()["network"]
     network["backbone"]["norm_scope"] = "stacked"
-    phase = [{"name": "packed", "steps": 1, "rate": 1e-3, "accumulate": 2, "losses": WARM_UP}]
-    train(make_recipe(phase=phase, network=network), options(tmp_path, cache))
+    phase = {"name": "packed", "steps": 1, "packed": 2, "losses": WARM_UP}
+    with pytest.raises(ValueError, match="packed=2 would normalise several pairs as one; choose packed=1"):
+        make_recipe(phase=[phase], network=network)
+
+
+def test_a_run_goes_on_with_other_packs(make_recipe: MakeRecipe) -> None:
+    phase = {
+        "name": "packed",
+        "steps": 4,
+        "rate": 0.1,
+        "optimizer": "sgd",
+        "accumulate": 4,
+        "losses": WARM_UP,
+    }
+    for packed in (4, 1):
+        recipe = make_recipe(phase=[{**phase, "packed": packed}], log_every=1)
+        check_same(recipe.to_dict(), make_recipe(phase=[phase], log_every=1).to_dict(), 0)
+    with pytest.raises(ValueError, match="another phase"):
+        check_same(recipe.to_dict(), make_recipe(phase=[{**phase, "rate": 0.2}]).to_dict(), 0)
