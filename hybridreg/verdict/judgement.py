@@ -198,10 +198,10 @@ def _slack(scene: Scene, at: PoseEvidence) -> Tolerance | None:
 
 
 def _drawn(scene: Scene, at: PoseEvidence, found: list[Hypothesis], *, ok: bool) -> Tolerance | None:
-    # Degrees and metres by which the surfaces draw a pose, most likely one that nobody refined, to where they fit better:
-    # one that would be "ok" beyond the tolerance, or one that would have failed to a pose within it that is "ok". Of
-    # some 800 poses of RANSAC and LGR on `sim:val`, with and without GICP, 16 that would be "ok" were wrong, of which 15
-    # are drawn so; 14 that would have failed were right, of which nine are.
+    # Degrees and metres by which the surfaces draw a pose, most likely one that nobody refined, to where they fit
+    # better: one that would be "ok" beyond the tolerance, or one that would have failed to a pose within it that is
+    # "ok". Of some 800 poses of RANSAC and LGR on `sim:val`, with and without GICP, 16 that would be "ok" were wrong,
+    # of which 15 are drawn so; 14 that would have failed were right, of which nine are.
     allowed = tolerance(scene.pair.source, scene.pair.target)
     middle = se3.apply(at.T, at.views.middle)
     for T in settle.at_rest(at.views, at.T):
