@@ -134,8 +134,8 @@ def _laid_together(clouds: list[tuple[Array, Array, Array]]) -> Recorded:
     moved = []
     for points, R, t in clouds:
         # Missing returns, which lie at zero, must not become points at the sensor.
-        missing = ~points.any(axis=1)
-        moved.append(np.where(missing[:, None], np.nan, points @ R.T + t))
+        seen = np.any(points, axis=1, keepdims=True)
+        moved.append(np.where(seen, points @ R.T + t, np.nan))
     place = clouds[0][2]
     at_rest = all(np.array_equal(t, place) for _, _, t in clouds)
     return Recorded(np.vstack(moved), holed=True, guess=place if at_rest and place.any() else None)
