@@ -47,7 +47,9 @@ def main(
 
     ``--batch`` is the pairs of a step, ``--packed`` how many of them go through the backbone at once.
     """
-    recipe = _RECIPE.format(half=_STEPS // 2, pairs=_PAIRS, steps=_STEPS, batch=batch, others=float(matching))
+    recipe = _RECIPE.format(
+        half=_STEPS // 2, pairs=_PAIRS, steps=_STEPS, batch=batch, packed=packed, others=float(matching)
+    )
     kinds = [("cpu", 1)]
     if torch.cuda.is_available():
         kinds += [("cuda", int(n)) for n in processes.split(",")]

@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 from benchmarks.__main__ import AGAINST_PEERS
+from hybridreg.learned.training import recipe, recipe_file
 
 ROOT = Path(__file__).resolve().parents[2]
 SCRIPTS = [
@@ -62,3 +63,16 @@ SIZED = {
 def test_the_size_that_a_script_takes_by_default_is_known(script: str, size: str) -> None:
     importlib.import_module(f"benchmarks.{script}").named_config(size)
     assert len(SIZED) >= 3
+
+
+def test_training_speed_writes_the_recipe_that_its_options_ask_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    training_speed = importlib.import_module("benchmarks.training_speed")
+    phases: list[recipe.Phase] = []
+
+    def seen(folder: Path, *_: object) -> float:
+        phases.extend(recipe_file.read(folder / "speed.toml").phase)
+        return 1.0
+
+    monkeypatch.setattr(training_speed, "_steps_a_second", seen)
+    training_speed.main(batch=32, packed=16)
+    assert {(each.accumulate, each.packed) for each in phases} == {(32, 16)}
