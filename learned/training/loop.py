@@ -59,9 +59,8 @@ class Loop:
             optimizer = make_optimizer(phase, self.network)
             if optimizer_state is not None:
                 optimizer.load_state_dict(optimizer_state)
-                for (
-                    group
-                ) in optimizer.param_groups:  # how it steps is this build's matter, not the checkpoint's
+                # How it steps is this build's matter, not the checkpoint's.
+                for group in optimizer.param_groups:
                     group.update({key: optimizer.defaults[key] for key in ("fused", "foreach")})
                 optimizer_state = None
             if not self._run_phase(phase, optimizer):
