@@ -142,19 +142,23 @@ def _view(scene: Scene, side: Side, wanted: float, on_grid: Scene) -> View:
         asked=asked,
         settling=balanced(surface, _N_ASKED),
         relief=_relief(scene, side, on_grid),
-        ground=_upright_ground(on_grid, side) if scene.pair.gravity == "known" else None,
+        ground=_upright_ground(on_grid, side, points, surface, wanted)
+        if scene.pair.gravity == "known"
+        else None,
         thickness=ground.thickness(points, wanted),
         centre=level.centre,
     )
 
 
-def _upright_ground(on_grid: Scene, side: Side) -> Ground | None:
+def _upright_ground(
+    on_grid: Scene, side: Side, points: Array, surface: Array, spacing: float
+) -> Ground | None:
     # Its upper side is that of the sensor; where nobody said where that stood, of what stands on it too. Not in a room,
-    # where what reaches from the floor to the ceiling stands on both.
+    # where what reaches from the floor to the ceiling stands on both. Of the view's points (n, 3), as they have normals.
     found, level = on_grid.grounds[side], on_grid.level(side)
     if found is None or level.viewpoint is None or getattr(on_grid.pair, side).said is not None:
         return found
-    facing = level.facing_ground
+    facing = ground.facing(points, surface, found, spacing)
     if facing is not None and float(facing.above(level.centre[None])[0]) > 0.0:
         return found
     by_content = ground.under(level.points, None, level.spacing)
