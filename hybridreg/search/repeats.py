@@ -14,68 +14,74 @@ Array = NDArray[np.float64]
 
 # Edge of a cell, spacings; by hand.
 _CELL = 1.0
-# Farthest shift, spacings: up to 10 m outdoors, a metre in a room; by hand.
-_FARTHEST = 20.0
+# Farthest shifts, spacings: across the rarest surface, up to 10 m outdoors, a metre in a room, and along its normal, where
+# a corridor repeats, as far as most of a cloud reaches (`hybridreg.resolution`); by hand.
+_ACROSS, _ALONG = 20.0, 60.0
 # Rotations tried with each shift, degrees; by hand.
 _TURNS_DEG = (-3.0, -1.5, 0.0, 1.5, 3.0)
 # Points that are shifted: for speed.
 _POINTS = 400
 # Share of the points that coincide at the pose which must coincide elsewhere; by hand.
-_SHARE = 0.4
+_SHARE = 0.25
 # Shifts returned, at most; by hand.
 _MOST = 4
 # Cells between two of them, at least; by hand.
 _APART = 2
 # Fewest points that identify a place; by hand.
 _FEWEST = 20
+# Points of either axis that coincide by chance, added to every count; by hand.
+_CHANCE = 10.0
 
 
 def copies(views: Views, T_target_source: Array, axes: Array) -> list[Array]:
     """Poses (4, 4) beside a pose, shifted along the commonest surface, at which nearly as many points coincide.
 
-    Only points that do not face the commonest axis `axes[0]` count (on a street, all but its ground); two points
-    coincide in one cell of a grid.
+    Points that face the commonest axis `axes[0]` coincide anywhere (on a street, those of its ground), and do not
+    count. Of those that face the other two the same share must coincide each: along a corridor the floor does anyway.
+    Two points coincide in one cell of a grid.
     """
     source, target, spacing = views.source, views.target, views.spacing
     frame = np.vstack([axes[1:], axes[:1]])  # the commonest direction last
     cell = _CELL * spacing
-    rows = source.settling[faced(source.normals[source.settling] @ T_target_source[:3, :3].T, axes) > 0]
-    things = se3.apply(T_target_source, source.points[rows[:_POINTS]])
-    other = target.points[faced(target.normals, axes) > 0]
-    if len(things) < _FEWEST or len(other) < _FEWEST:
+    reach = (round(_ACROSS / _CELL), round(_ALONG / _CELL))
+    axis = faced(source.normals[source.settling] @ T_target_source[:3, :3].T, axes)
+    rows, axis = source.settling[axis > 0][:_POINTS], axis[axis > 0][:_POINTS]
+    other = faced(target.normals, axes)
+    if len(rows) < _FEWEST or np.count_nonzero(other > 0) < _FEWEST:
         return []
+    things = se3.apply(T_target_source, source.points[rows])
     middle = things.mean(axis=0)
-    reach = round(_FARTHEST / _CELL)
-    arms, others = things - middle, (other - middle) @ frame.T
-    near = np.abs(others).max(axis=1) < np.linalg.norm(arms, axis=1).max() + 2 * reach * cell
-    if not near.any():
-        return []
-    held = _Cells(others[near], cell)
-    met = np.stack([held.met(_turned(arms, axes[0], deg) @ frame.T, reach) for deg in _TURNS_DEG])
-    best, turn = met.max(axis=0), met.argmax(axis=0)
-    peaks = _peaks(best, max(_SHARE * best[reach, reach], 0.5 * _FEWEST))
+    arms = things - middle
+    farthest = np.linalg.norm(arms, axis=1).max() + 2 * max(reach) * cell
+    turns = [arms @ se3.rotation_about(np.radians(deg) * axes[0]).T @ frame.T for deg in _TURNS_DEG]
+    share = np.full((len(turns), 2 * reach[0] + 1, 2 * reach[1] + 1), np.inf)
+    for facing in (1, 2):
+        held = (target.points[other == facing] - middle) @ frame.T
+        held = held[np.abs(held).max(axis=1) < farthest]
+        if len(held) == 0:
+            continue
+        cells = _Cells(held, cell)
+        met = _CHANCE + np.stack([cells.met(turned[axis == facing], reach) for turned in turns])
+        np.minimum(share, met / met[:, *reach].max(), out=share)
+    best, turn = share.max(axis=0), share.argmax(axis=0)
     poses = []
-    for i, j in peaks:
-        shift = cell * np.array([i - reach, j - reach, 0]) @ frame
+    for i, j in _peaks(best):
+        shift = cell * np.array([i - reach[0], j - reach[1], 0]) @ frame
         turned = se3.rotation_about(np.radians(_TURNS_DEG[turn[i, j]]) * axes[0])
         poses.append(se3.about(middle, turned, shift) @ T_target_source)
     return poses
 
 
-def _peaks(met: NDArray[np.int64], least: float) -> list[tuple[int, int]]:
-    # Cells that hold no less than those around, the fullest first, without the pose itself in the middle.
+def _peaks(share: Array) -> list[tuple[int, int]]:
+    # Shifts at which no less coincides than at those around, the best first, without the pose itself in the middle.
     from scipy.ndimage import maximum_filter
 
-    middle = len(met) // 2
-    peak = (met == maximum_filter(met, 2 * _APART + 1, mode="constant")) & (met >= least)
-    peak[middle - _APART : middle + _APART + 1, middle - _APART : middle + _APART + 1] = False
-    i, j = np.nonzero(peak)
-    order = np.argsort(-met[i, j], kind="stable")[:_MOST]
-    return list(zip(i[order].tolist(), j[order].tolist(), strict=True))
-
-
-def _turned(arms: Array, axis: Array, degrees: float) -> Array:
-    return arms @ se3.rotation_about(np.radians(degrees) * axis).T
+    i, j = (n // 2 for n in share.shape)
+    peak = (share == maximum_filter(share, 2 * _APART + 1, mode="constant")) & (share >= _SHARE)
+    peak[i - _APART : i + _APART + 1, j - _APART : j + _APART + 1] = False
+    rows, columns = np.nonzero(peak)
+    order = np.argsort(-share[rows, columns], kind="stable")[:_MOST]
+    return list(zip(rows[order].tolist(), columns[order].tolist(), strict=True))
 
 
 class _Cells:
@@ -91,21 +97,24 @@ class _Cells:
         i, j, k = cells
         return (k * self._size[0] + i) * self._size[1] + j
 
-    def met(self, points: Array, reach: int) -> NDArray[np.int64]:
-        """How many of the points (n, 3) fall into these cells under each shift: (2 reach + 1, 2 reach + 1)."""
+    def met(self, points: Array, reach: tuple[int, int]) -> NDArray[np.int64]:
+        """How many of the points (n, 3) fall into these cells under each shift of up to so many rows and columns."""
         across, along, height = (np.floor(points / self._cell).astype(np.int64) - self._origin).T
-        shift = np.arange(-reach, reach + 1)
+        rows, columns = reach
+        shift = np.arange(-rows, rows + 1)
         # Cells of one row follow one another among the keys: one stretch for each point and shift across.
         moved = across[:, None] + shift
         point, nth = np.nonzero(
             (moved >= 0) & (moved < self._size[0]) & ((height >= 0) & (height < self._size[2]))[:, None]
         )
         i, j, k = moved[point, nth], along[point], height[point]
-        lowest, highest = np.maximum(j - reach, 0), np.minimum(j + reach, self._size[1] - 1)
+        lowest, highest = np.maximum(j - columns, 0), np.minimum(j + columns, self._size[1] - 1)
         start = np.searchsorted(self._keys, self._key(np.array([i, lowest, k])))
         end = np.searchsorted(self._keys, self._key(np.array([i, highest, k])), side="right")
         many = np.where(lowest <= highest, end - start, 0)
         at = np.repeat(start - (np.cumsum(many) - many), many) + np.arange(many.sum())
-        column = self._keys[at] % self._size[1] - np.repeat(j, many) + reach
-        side = 2 * reach + 1
-        return np.bincount(np.repeat(nth, many) * side + column, minlength=side * side).reshape(side, side)
+        column = self._keys[at] % self._size[1] - np.repeat(j, many) + columns
+        shape = (2 * rows + 1, 2 * columns + 1)
+        return np.bincount(
+            np.repeat(nth, many) * shape[1] + column, minlength=shape[0] * shape[1]
+        ).reshape(shape)
