@@ -115,6 +115,6 @@ class _Cells:
         at = np.repeat(start - (np.cumsum(many) - many), many) + np.arange(many.sum())
         column = self._keys[at] % self._size[1] - np.repeat(j, many) + columns
         shape = (2 * rows + 1, 2 * columns + 1)
-        return np.bincount(
-            np.repeat(nth, many) * shape[1] + column, minlength=shape[0] * shape[1]
-        ).reshape(shape)
+        return np.bincount(np.repeat(nth, many) * shape[1] + column, minlength=shape[0] * shape[1]).reshape(
+            shape
+        )

@@ -7,7 +7,11 @@ import tracemalloc
 
 import numpy as np
 
-from hybridreg.search.repeats import _Cells
+from hybridreg.evidence import views
+from hybridreg.evidence.agreement import compare
+from hybridreg.pair import Pair
+from hybridreg.scene import Scene
+from hybridreg.search.repeats import _Cells, copies
 
 
 def test_counts_are_those_of_every_shift_tried_by_itself() -> None:
@@ -31,3 +35,32 @@ def test_a_wide_sparse_cloud_costs_no_memory() -> None:
     tracemalloc.stop()
     assert met[20, 60] == 35
     assert peak < 20e6
+
+
+def corridor(begin: float, end: float, piers: list[float], seed: int) -> np.ndarray:
+    """Walls, floor, ceiling, and piers that stand out from a wall at some places along x."""
+    rng = np.random.default_rng(seed)
+
+    def face(n: int, low: list[float], high: list[float]) -> np.ndarray:
+        return rng.uniform(low, high, (n, 3))
+
+    n = round(1500 * (end - begin))
+    sides = [face(n, [begin, y, 0.0], [end, y, 2.5]) for y in (-1.0, 1.0)] + [
+        face(n // 2, [begin, -1.0, z], [end, 1.0, z]) for z in (0.0, 2.5)
+    ]
+    return np.concatenate([*sides, *(face(300, [x, 0.4, 0.0], [x, 1.0, 2.5]) for x in piers)])
+
+
+def test_a_place_farther_along_a_corridor_is_found_though_its_floor_is_alike_all_along() -> None:
+    """`sim:val/degenerate` 84: the true pose lay 40 cells away, and the cells of the floor outnumbered those of what
+    tells one place from another."""
+    piers = [0.0, 0.7, 1.9]
+    target = corridor(-6.0, 9.0, [*piers, *(x + 3.0 for x in piers)], seed=0)
+    pair = Pair.of(corridor(-3.0, 4.0, piers, seed=1) - [0.5, 0.0, 1.3], target)
+    both = views.of(Scene.on_cells(pair, 0.1))
+    right = np.eye(4)
+    right[:3, 3] = [0.5, 0.0, 1.3]
+    found = copies(both, right, compare(both, right).axes)
+    off = [float(np.linalg.norm(T[:3, 3] - right[:3, 3] - [3.0, 0.0, 0.0])) for T in found]
+    assert 20.0 * both.spacing < 3.0
+    assert min(off) < 0.25
