@@ -52,13 +52,21 @@ class Table:
     paper: Printed | None = None
 
     def remarks(self) -> list[str]:
-        """Sentences on what was not run."""
+        """Sentences on what was not run or not read."""
         without = (f"{name} ran without {text}" for name, text in self.left_out.items())
         return [
             *(f"Not run: {name}. {problem}" for name, problem in self.problems.items()),
             *without,
+            *self._unread(),
             *self._own_grids(),
         ]
+
+    def _unread(self) -> list[str]:
+        rows = max((entry.rows for entry in self.entries), key=len, default=[])
+        n = sum(row.T_true is None for row in rows)
+        if not n:
+            return []
+        return [f"{n} of {number_of(len(rows), 'pair')} could not be read: against the recall, in no other number"]
 
     def failure(self) -> str:
         """Why every row of every method failed, by the first; empty where one did not."""

@@ -19,6 +19,7 @@ from hybridreg.eval.run.controls import MARK, Control
 from hybridreg.eval.score import paper
 from hybridreg.eval.score.paper import Printed
 from hybridreg.eval.score.protocols import Protocol, protocol
+from hybridreg.eval.scored_table import IDENTITY
 from hybridreg.io.shipped_weights import MissingWeights
 from hybridreg.io.structured import parse_toml, read_toml
 from hybridreg.pipeline import Pipeline
@@ -118,6 +119,10 @@ def parse(table: Mapping[str, Any], *, title: str = "table") -> Recipe:
     double = next((line.name for line in lines if names.count(slug(line.name)) > 1), None)
     if double is not None:
         raise ValueError(f"two rows are called {double!r}; give each its own name")
+    if slug(IDENTITY) in names:
+        raise ValueError(
+            f"a row is called {IDENTITY!r}, as the first one of every table is; give it another name"
+        )
     return Recipe(
         title=content.title or title,
         data=content.data,

@@ -184,7 +184,7 @@ def of_files(paths: Sequence[str | os.PathLike[str]]) -> Table:
     ValueError
         The files are not of the same data.
     """
-    entries = [_entry(Path(path).stem, Path(path)) for path in paths]
+    entries = [_entry(_named_after(Path(path)), Path(path)) for path in paths]
     made = [
         build(_Made, {key: entry.config.get(key) for key in ("data", "seed")}, f"{os.fspath(path)}, line 1")
         for entry, path in zip(entries, paths, strict=True)
@@ -229,6 +229,11 @@ def _visits(methods: Mapping[str, Any]) -> dict[str, int]:
 def _entry(name: str, path: Path) -> Entry:
     read = store.read(path)
     return Entry(name=name, rows=read.rows, config=read.config)
+
+
+def _named_after(path: Path) -> str:
+    # The table's own row of that name must stay the only one.
+    return path.name if path.stem == IDENTITY else path.stem
 
 
 def _with_identity(entries: list[Entry]) -> list[Entry]:

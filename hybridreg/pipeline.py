@@ -183,6 +183,7 @@ class Pipeline(Stage):
             spec=self.to_spec(),
             tolerance=tolerance(pair.source, pair.target),
             entries=trace.estimated.entries,
+            found=trace.refined.found,
         )
 
     def trace(self, pair: Pair, *, seed: int = 0, matches: Any = None) -> Trace:

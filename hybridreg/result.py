@@ -80,6 +80,8 @@ class RegistrationResult:
         asked for it.
     scale_verdict : "ok", "doubtful", "failed" or None
         Whether to believe the scale; None where it was not asked for.
+    found : bool
+        Whether any pose was found. Where none was, the verdict is "failed" and `transformation` the identity.
     """
 
     transformation: Array
@@ -101,6 +103,7 @@ class RegistrationResult:
     centre: Array = field(default_factory=lambda: np.zeros(3), repr=False)
     scale: float = 1.0
     scale_verdict: Word | None = None
+    found: bool = True
 
     @property
     def T_target_source(self) -> Array:

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import Any, Protocol, runtime_checkable
 
 from hybridreg.frames import raise_pose
+from hybridreg.geometry import se3
 from hybridreg.matches import Correspondences
 from hybridreg.pair import Pair
 from hybridreg.pipeline import Trace
@@ -26,8 +27,11 @@ class Traceable(Protocol):
     def conclude(self, trace: Trace, *, seed: int = 0) -> RegistrationResult: ...
 
 
-# Or a function of pair and seed that returns a 4x4 pose, a RegistrationResult, or None for "not found".
+# Or a function of pair and seed that returns a 4x4 pose, a RegistrationResult, anything else with the pose as
+# `transformation` (Open3D's results), or None for "not found".
 Method = Traceable | Callable[[Pair, int], Any]
+# By how much an answer's rotation may be off, from float32 or few digits; it is made exact.
+_ROUNDED = 1e-3
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -69,8 +73,7 @@ def _traced(method: Traceable, pair: Pair, seed: int) -> Attempt:
     trace = method.trace(pair, seed=seed)
     result = method.conclude(trace, seed=seed)
     return Attempt(
-        # A pose that was not found is the identity, which would count as right for nearby pairs.
-        T=result.transformation if trace.refined.found else None,
+        T=_pose(result.transformation) if trace.refined.found else None,
         T_estimated=raise_pose(trace.estimated.T, pair) if trace.estimated.found else None,
         seconds=dict(result.seconds),
         matches=result.matches,
@@ -81,11 +84,26 @@ def _traced(method: Traceable, pair: Pair, seed: int) -> Attempt:
 
 def _called(method: Callable[[Pair, int], Any], pair: Pair, seed: int) -> Attempt:
     answer = method(pair, seed)
-    if isinstance(answer, RegistrationResult):
-        return Attempt(
-            T=answer.transformation, seconds=dict(answer.seconds), matches=answer.matches, result=answer
-        )
-    return Attempt(T=answer, seconds={})
+    if answer is None:
+        return Attempt(T=None, seconds={})
+    if not isinstance(answer, RegistrationResult):
+        return Attempt(T=_pose(getattr(answer, "transformation", answer)), seconds={})
+    return Attempt(
+        # A pose that was not found is the identity, which would count as right for nearby pairs.
+        T=_pose(answer.transformation) if answer.found else None,
+        seconds=dict(answer.seconds),
+        matches=answer.matches,
+        result=answer,
+    )
+
+
+def _pose(answer: Any) -> Any:
+    try:
+        return se3.rounded(answer, "the method's answer", _ROUNDED)
+    except ValueError as error:
+        raise ValueError(
+            f"{error}; a method returns a rigid 4x4 pose, a RegistrationResult, or None where it found none"
+        ) from error
 
 
 def one_line(error: BaseException) -> str:

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import dataclasses
+import inspect
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
@@ -13,11 +14,13 @@ from hybridreg import __version__
 from hybridreg.data import content
 from hybridreg.data.dataset import fingerprint_of, ids_of, looks_of, vouch
 from hybridreg.eval.run import truth
-from hybridreg.eval.run.attempt import Method, attempt, one_line
+from hybridreg.eval.run.attempt import Method, Traceable, attempt, one_line
 from hybridreg.eval.run.controls import Control, after
 from hybridreg.eval.run.header import fingerprint_under
+from hybridreg.eval.run.own_content import own_content
 from hybridreg.eval.run.row import Row
 from hybridreg.eval.run.store import Appender
+from hybridreg.fitting import check_seed
 from hybridreg.io.shipped_weights import CONFIG_FILE, WEIGHTS_FILE
 from hybridreg.pair import LabelledPair
 from hybridreg.runtime.threads import one_thread
@@ -59,14 +62,18 @@ def predict(
 
     Raises
     ------
+    TypeError
+        The method is neither a pipeline nor a function of two arguments.
     ValueError
         The file was made by another configuration or version, of data or weights with another content; it is being
-        written by another process; two pairs share an id; or the poses map target to source.
+        written by another process; two pairs share an id; the poses map target to source; or the seed is negative.
     ImportError
         A package that the method or the data need is not here; what was never run is not a failed row.
     OSError
         The file cannot be written.
     """
+    _check(method)
+    check_seed(seed)
     ids = ids_of(pairs)
     vouch(pairs)
     seen = looks_of(pairs)
@@ -98,18 +105,39 @@ def predict(
     return sorted(rows.values(), key=lambda row: row.index)
 
 
+def _check(method: Any) -> None:
+    # A mistake of the caller's, which every pair would repeat.
+    if isinstance(method, (Traceable, Control)) and not isinstance(method, type):
+        return
+    if isinstance(method, str):
+        raise TypeError(f"method {method!r}: expected a pipeline, such as Pipeline.preset({method!r})")
+    if not callable(method) or isinstance(method, type):
+        raise TypeError(f"method {method!r}: expected a pipeline or a function of (pair, seed)")
+    try:
+        signature = inspect.signature(method)
+    except ValueError:  # of some functions that are compiled
+        return
+    try:
+        signature.bind("pair", 0)
+    except TypeError as error:
+        raise TypeError(f"method {method!r}: a function is called with (pair, seed), but: {error}") from None
+
+
 def describe(method: Any) -> dict[str, Any]:
-    """What identifies a method in a configuration: a pipeline's spec, or a callable's name and fields."""
+    """What identifies a method in a configuration: a pipeline's spec, or a callable's name and fields; and the content
+    of what is the user's own in it."""
+    own = own_content(method)
+    content = {} if own is None else {"own_content": own}
     if hasattr(method, "to_spec"):
         spec: dict[str, Any] = method.to_spec()
-        return spec
+        return {**spec, **content}
     fields = (
         dataclasses.asdict(method)
         if dataclasses.is_dataclass(method) and not isinstance(method, type)
         else {}
     )
     named = method if hasattr(method, "__qualname__") else type(method)
-    return {"callable": f"{named.__module__}:{named.__qualname__}", **fields}
+    return {"callable": f"{named.__module__}:{named.__qualname__}", **fields, **content}
 
 
 def weights_of(described: Any) -> dict[str, str]:

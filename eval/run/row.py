@@ -12,12 +12,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybridreg.config.plain_values import build
+from hybridreg.geometry import se3
 from hybridreg.io.structured import parse_json
 
 Array = NDArray[np.float64]
 Matrix = list[list[float]]
 
-_MATRICES = ("T", "T_estimated", "T_true", "moments")
+# By how much a stored rotation may be off.
+_ROUNDED = 1e-3
+_POSES = ("T", "T_estimated", "T_true")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -89,9 +92,11 @@ class Row:
             The text is not a row, or a value is not of its field's type.
         """
         row = build(cls, parse_json(text, "not a row of predictions"), "not a row of predictions")
-        for name in _MATRICES:
-            if getattr(row, name) is not None and matrix(getattr(row, name)) is None:
-                raise ValueError(f"not a row of predictions: {name} is not a finite 4x4 matrix")
+        if row.moments is not None and matrix(row.moments) is None:
+            raise ValueError("not a row of predictions: moments is not a finite 4x4 matrix")
+        for name in _POSES:
+            if getattr(row, name) is not None:
+                se3.check(getattr(row, name), f"not a row of predictions: {name}", _ROUNDED)
         return row
 
     @property

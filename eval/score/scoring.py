@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from hybridreg.data.yaw_starts import start_of
 from hybridreg.eval.run.row import Row
 from hybridreg.eval.score import bootstrap, errors
 from hybridreg.eval.score.errors import Errors, Step
@@ -117,7 +118,7 @@ def score(rows: Sequence[Row], protocol: Protocol) -> Score:
 
 def scene_of(row: Row) -> str:
     """Name of the pair that a row's random yaw rotations come from."""
-    return row.id.partition("@")[0]
+    return start_of(row.id)
 
 
 def identity(rows: Sequence[Row]) -> list[Row]:

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import dataclasses
+import re
 import zlib
 from collections.abc import Sequence
 
@@ -49,6 +50,11 @@ class YawStarts(Dataset):
     def vouch(self) -> None:
         """As the pairs themselves do."""
         vouch(self.pairs)
+
+
+def start_of(name: str) -> str:
+    """Name of the pair that a start of this name was made from; of any other pair its own."""
+    return re.sub(r"@yaw\d+$", "", name)
 
 
 def yaw_starts(pairs: Sequence[LabelledPair], n: int = 3, seed: int = 0) -> YawStarts:

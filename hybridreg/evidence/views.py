@@ -154,7 +154,7 @@ def _upright_ground(
     on_grid: Scene, side: Side, points: Array, surface: Array, spacing: float
 ) -> Ground | None:
     # Its upper side is that of the sensor; where nobody said where that stood, of what stands on it too. Not in a room,
-    # where what reaches from the floor to the ceiling stands on both: `points` (n, 3) of the view have normals, and show
+    # where what reaches from the floor to the ceiling stands on both: the view's `points` (n, 3) have normals, and show
     # the other side.
     found, level = on_grid.grounds[side], on_grid.level(side)
     if found is None or level.viewpoint is None or getattr(on_grid.pair, side).said is not None:

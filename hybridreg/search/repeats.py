@@ -14,8 +14,8 @@ Array = NDArray[np.float64]
 
 # Edge of a cell, spacings; by hand.
 _CELL = 1.0
-# Farthest shifts, spacings: across the rarest surface, up to 10 m outdoors, a metre in a room, and along its normal, where
-# a corridor repeats, as far as most of a cloud reaches (`hybridreg.resolution`); by hand.
+# Farthest shifts, spacings: along the commoner of the two axes, up to 10 m outdoors, a metre in a room, and along the
+# rarer, where a corridor repeats, as far as most of a cloud reaches (`hybridreg.resolution`); by hand.
 _ACROSS, _ALONG = 20.0, 60.0
 # Rotations tried with each shift, degrees; by hand.
 _TURNS_DEG = (-3.0, -1.5, 0.0, 1.5, 3.0)
@@ -62,7 +62,7 @@ def copies(views: Views, T_target_source: Array, axes: Array) -> list[Array]:
             continue
         cells = _Cells(held, cell)
         met = _CHANCE + np.stack([cells.met(turned[axis == facing], reach) for turned in turns])
-        np.minimum(share, met / met[:, *reach].max(), out=share)
+        np.minimum(share, met / met[:, reach[0], reach[1]].max(), out=share)
     best, turn = share.max(axis=0), share.argmax(axis=0)
     poses = []
     for i, j in _peaks(best):

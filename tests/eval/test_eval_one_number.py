@@ -124,8 +124,12 @@ def test_a_downsampling_that_does_not_reach_the_matcher_stands_in_the_table() ->
 
     scene, _ = testing.sample_scene()
     assert not note_grid(scene, 0.8)
-    rows = [Row(index=0, id="p", notes=list(scene.notes))]
-    entries = [Entry(name="learned, finely", rows=rows), Entry(name="fpfh", rows=[Row(index=0, id="p")])]
+    truth = np.eye(4).tolist()
+    rows = [Row(index=0, id="p", T_true=truth, notes=list(scene.notes))]
+    entries = [
+        Entry(name="learned, finely", rows=rows),
+        Entry(name="fpfh", rows=[Row(index=0, id="p", T_true=truth)]),
+    ]
     told = Table(title="t", data="d", seed=0, starts=0, entries=entries).remarks()
     assert told == [
         "What the downsample slot chose did not reach the networks of learned, finely: each put the clouds on a "

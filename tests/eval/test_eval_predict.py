@@ -3,19 +3,23 @@ from __future__ import annotations
 
 import json
 import pickle
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
-from eval_stubs import Moody, RowByRow, Scattered
+from eval_stubs import Moody, RowByRow, Scattered, kabsch
 
+from hybridreg.cloud import PointCloud
 from hybridreg.eval import predict, protocol, read, score
 from hybridreg.eval.run.store import differences
 from hybridreg.eval.score import metrics
 from hybridreg.frames import lower_pose
 from hybridreg.geometry import se3
-from hybridreg.pair import Pair
+from hybridreg.pair import LabelledPair, Pair
 
 KITTI = protocol("kitti")
 
@@ -54,7 +58,9 @@ def test_every_failure_is_a_row(tmp_path: Path) -> None:
     assert right.T is not None
     assert np.array_equal(wrong.T, np.eye(4))
     assert raised.error == "RuntimeError: pair-1 is beyond me"
-    assert (none.T, none.error, nan.T, nan.error) == (None, None, None, None)
+    assert (none.T, none.error) == (None, None)
+    assert nan.T is None
+    assert "the method's answer: the matrix is not finite" in str(nan.error)
     assert raised.T_true is not None
     assert lost.error == "OSError: pair-5: the disk is gone"
     assert lost.T_true is None
@@ -65,6 +71,106 @@ def test_every_failure_is_a_row(tmp_path: Path) -> None:
 def test_a_pose_that_was_not_found_is_none_not_the_identity(tmp_path: Path) -> None:
     rows = predict(RowByRow(found=False), Scattered(2), tmp_path / "p.jsonl")
     assert all(row.T is None and row.T_estimated is None for row in rows)
+
+
+def _bent(pair: Pair, seed: int, by: Any) -> Any:
+    return kabsch(pair.source.points[:200], pair.target.points) @ by
+
+
+def _answer(pair: Pair, seed: int, what: Any) -> Any:
+    return what
+
+
+def _as_open3d(pair: Pair, seed: int) -> Any:
+    return SimpleNamespace(transformation=kabsch(pair.source.points[:200], pair.target.points))
+
+
+@pytest.mark.parametrize(
+    "by",
+    [
+        np.diag([3.0, 3.0, 3.0, 1.0]),
+        np.diag([1.0, 1.0, -1.0, 1.0]),
+        np.array([[1.0, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [9, 9, 9, 5]]),
+        np.array([[1.0, 0.3, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]),
+    ],
+)
+def test_a_pose_that_is_no_rigid_motion_is_no_success(tmp_path: Path, by: np.ndarray) -> None:
+    rows = predict(partial(_bent, by=by), Scattered(2), tmp_path / "p.jsonl")
+    assert all(
+        row.T is None and str(row.error).startswith("ValueError: the method's answer: ") for row in rows
+    )
+    assert score(rows, KITTI).recall == 0.0
+
+
+@pytest.mark.parametrize(
+    ("what", "told"),
+    [
+        (np.eye(4)[:3], "expected shape (4, 4), got (3, 4)"),
+        ("right there", "expected numbers of shape (4, 4)"),
+        ((np.eye(3), np.zeros(3)), "expected numbers of shape (4, 4)"),
+        (b"4x4", "expected numbers of shape (4, 4)"),
+    ],
+)
+def test_an_answer_of_another_form_is_named(tmp_path: Path, what: Any, told: str) -> None:
+    (row,) = predict(partial(_answer, what=what), Scattered(1), tmp_path / "p.jsonl")
+    assert told in str(row.error)
+    assert "a method returns a rigid 4x4 pose" in str(row.error)
+
+
+def test_a_result_with_a_transformation_is_taken_as_open3d_gives_it(tmp_path: Path) -> None:
+    assert score(predict(_as_open3d, Scattered(2), tmp_path / "p.jsonl"), KITTI).recall == 1.0
+
+
+def test_a_result_without_a_pose_is_no_success_though_the_identity_would_be(tmp_path: Path) -> None:
+    near = Near(1)
+    rows = predict(partial(_run, RowByRow(found=False)), near, tmp_path / "p.jsonl")
+    assert (rows[0].T, rows[0].verdict, rows[0].error) == (None, "ok", None)
+    assert score(rows, KITTI).recall == 0.0
+
+
+def _run(method: RowByRow, pair: Pair, seed: int) -> Any:
+    return replace(method.conclude(method.trace(pair)), found=method.found)
+
+
+class Near(Scattered):
+    """Pairs whose clouds lie as they are."""
+
+    def load(self, index: int) -> LabelledPair:
+        labelled = super().load(index)
+        target = PointCloud.of(labelled.pair.source.points[:200])
+        return replace(labelled, pair=labelled.pair.replaced(target=target), T_target_source=np.eye(4))
+
+
+@pytest.mark.parametrize(
+    ("method", "told"),
+    [
+        ("birdseye-gicp", r"Pipeline\.preset\('birdseye-gicp'\)"),
+        (lambda pair: np.eye(4), "too many positional arguments"),
+        (None, "expected a pipeline or a function"),
+        (RowByRow, "expected a pipeline or a function"),
+    ],
+)
+def test_what_no_pair_could_be_given_to_is_refused(tmp_path: Path, method: Any, told: str) -> None:
+    with pytest.raises(TypeError, match=told):
+        predict(method, Scattered(1), tmp_path / "p.jsonl")
+    assert not (tmp_path / "p.jsonl").exists()
+
+
+def test_a_negative_seed_is_refused_before_any_pair(tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match=r"seed=-1 must be a whole number"):
+        predict(RowByRow(), Scattered(1), tmp_path / "p.jsonl", seed=-1)
+    assert not (tmp_path / "p.jsonl").exists()
+
+
+def test_a_stored_pose_that_is_none_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "p.jsonl"
+    predict(RowByRow(), Scattered(1), path)
+    header, line = path.read_text().splitlines()
+    row = json.loads(line)
+    row["T"][0][0] *= 3.0
+    path.write_text(f"{header}\n{json.dumps(row)}\n")
+    with pytest.raises(ValueError, match=r"T: the upper left 3x3 block is not a rotation"):
+        read(path)
 
 
 def test_stops_and_goes_on_without_doing_a_pair_twice(tmp_path: Path) -> None:

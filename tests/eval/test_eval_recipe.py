@@ -78,6 +78,7 @@ def test_a_combination_that_does_not_fit_stays_with_its_reason() -> None:
             "rows: unknown; a table has base, data, paper, protocols, row, seed, starts, sweep, title",
         ),
         ({"row": [{"preset": "icp"}, {"preset": "icp"}]}, "two rows are called 'icp'"),
+        ({"row": [{"preset": "icp", "name": "Identity"}]}, "a row is called 'identity'"),
         (
             {"row": [{"preset": "icp", "refin": "none"}]},
             "refin: unknown; a row has name, preset, pipeline, voxel",

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from hybridreg.eval import PROTOCOLS, Protocol, protocol, score
 from hybridreg.eval.score import bootstrap, curves, errors, scoring
+from hybridreg.eval.scored_table import Entry, Table
 
 CROSS, KITTI, PREDATOR = (PROTOCOLS[name] for name in ("cross3dreg", "kitti", "predator"))
 
@@ -66,6 +67,9 @@ def test_a_pair_that_could_not_be_read_counts_against_recall_only() -> None:
     s = score([row(0, 1.0, 0.1), lost], KITTI)
     assert (s.recall, s.n_failed) == (0.5, 1)
     assert s.rre_deg_all == pytest.approx(1.0)
+    entries = [Entry(name="m", rows=[row(0, 1.0, 0.1), lost])]
+    (told,) = Table(title="t", data="d", seed=0, starts=0, entries=entries).remarks()
+    assert told == "1 of 2 pairs could not be read: against the recall, in no other number"
 
 
 def test_success_is_strict() -> None:
@@ -156,6 +160,12 @@ def test_turned_copies_do_not_narrow_the_interval() -> None:
     as_if_independent = bootstrap.interval(copied, [str(i) for i in range(24)])
     assert by_scene == bootstrap.interval(values, names)
     assert by_scene[1] - by_scene[0] > 1.5 * (as_if_independent[1] - as_if_independent[0])
+
+
+def test_only_a_turned_copy_belongs_to_the_scene_of_another_pair() -> None:
+    names = ["drive@0", "drive@1", "drive@1@yaw2", "a@b@yaw", "plain@yaw13"]
+    rows = [dataclasses.replace(row(0, 0.0, 0.0), id=name) for name in names]
+    assert [scoring.scene_of(each) for each in rows] == ["drive@0", "drive@1", "drive@1", "a@b@yaw", "plain"]
 
 
 def test_interval_of_nothing_is_nan() -> None:

@@ -82,6 +82,9 @@ def test_files_of_the_same_data_make_a_table(ran: tuple[Table, Path], tmp_path: 
     _, out = ran
     files = [out / "predictions" / name for name in ("moody-b.jsonl", "exact.jsonl")]
     assert [entry.name for entry in table_run.of_files(files).entries] == ["identity", "moody-b", "exact"]
+    own = tmp_path / "identity.jsonl"
+    own.write_bytes(files[0].read_bytes())
+    assert [entry.name for entry in table_run.of_files([own]).entries] == ["identity", "identity.jsonl"]
     table_run.run(dataclasses.replace(RECIPE, starts=0), Scattered(2), tmp_path, data="scattered")
     with pytest.raises(ValueError, match="of other data"):
         table_run.of_files([files[0], tmp_path / "predictions" / "exact.jsonl"])
