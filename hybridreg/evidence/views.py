@@ -157,9 +157,15 @@ def _upright_ground(
     # where what reaches from the floor to the ceiling stands on both: the view's `points` (n, 3) have normals, and show
     # the other side.
     found, level = on_grid.grounds[side], on_grid.level(side)
-    if found is None or level.viewpoint is None or getattr(on_grid.pair, side).said is not None:
+    first = level.ground  # of two that face one another, whichever of them was taken
+    if (
+        found is None
+        or first is None
+        or level.viewpoint is None
+        or getattr(on_grid.pair, side).said is not None
+    ):
         return found
-    facing = ground.facing(points, surface, found, spacing)
+    facing = ground.facing(points, surface, first, spacing)
     if facing is not None and float(facing.above(level.centre[None])[0]) > 0.0:
         return found
     by_content = ground.under(level.points, None, level.spacing)

@@ -11,7 +11,7 @@ from hybridreg.evidence.agreement import Agreement
 from hybridreg.evidence.evidence import Evidence
 from hybridreg.evidence.information import Information
 from hybridreg.resolution import Tolerance
-from hybridreg.verdict.confidence import CLEAR, SIZE_GAIN, SPARSE
+from hybridreg.verdict.confidence import CLEAR, SIZE_GAIN, SPARSE, mostly_through
 
 # The bounds beyond which a number is worth a sentence; nine in ten right poses of simulated scenes stay within them.
 # Share of the visible points that violates free space.
@@ -79,6 +79,11 @@ def _against(
             f"free space is violated: the sensors saw through {through:.0%} of the points that they should have hit "
             f"({evidence.looked_through_source:.0%} of the source's, "
             f"{evidence.looked_through_target:.0%} of the target's)"
+        )
+    elif mostly_through(evidence):
+        yield (
+            f"free space is violated: beside the commonest surface {evidence.through_rare:.0f} points are seen through, and "
+            f"{evidence.agreed_rare:.0f} agree; is a cloud scaled, stretched or bent?"
         )
     elif through_walls:
         yield f"free space is violated: the scanners saw through {evidence.looked_through_rare:.0%} of the walls"
