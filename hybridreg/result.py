@@ -52,7 +52,7 @@ class RegistrationResult:
         Sum of J^T J of point-to-plane distances in metres at the pose, rotation (radians) before translation,
         about the centre of the overlap; a small eigenvalue is a poorly constrained direction.
     rivals : (r, 4, 4) float64
-        Other poses that explain the data nearly as well.
+        Other poses that explain the data nearly as well, or would be likely were there no better one.
     matches : Correspondences
         What the pose was estimated from, in the user's coordinates; where several matchers ran, the matches of the one
         that agrees best with the pose.

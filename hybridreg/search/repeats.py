@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Repeated structure near a pose: rows, racks, ribs, and maps that hold a place twice."""
+"""Repeated structure near a pose: rows, racks, ribs, floors, and maps that hold a place twice."""
 
 from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,23 +11,26 @@ from numpy.typing import NDArray
 from hybridreg.evidence.views import Views
 from hybridreg.geometry import se3
 from hybridreg.geometry.main_axes import faced
+from hybridreg.search.occupied_cells import OccupiedCells
 
 Array = NDArray[np.float64]
 
 # Edge of a cell, spacings; by hand.
 _CELL = 1.0
-# Farthest shifts, spacings: along the commoner of the two axes, up to 10 m outdoors, a metre in a room, and along the
+# Farthest shifts, cells: along the commoner of the two axes, up to 10 m outdoors, a metre in a room, and along the
 # rarer, where a corridor repeats, as far as most of a cloud reaches (`hybridreg.resolution`); by hand.
-_ACROSS, _ALONG = 20.0, 60.0
+_ACROSS, _ALONG = 20, 60
 # Rotations tried with each shift, degrees; by hand.
-_TURNS_DEG = (-3.0, -1.5, 0.0, 1.5, 3.0)
-# Points that are shifted: for speed.
+_TURNS_DEG = (-4.5, -3.0, -1.5, 0.0, 1.5, 3.0, 4.5)
+# Degrees between turns without a shift, and the first of them; by hand.
+_ROUND_DEG, _FIRST_DEG = 1.5, 6.0
+# Points of each kind that are moved: for speed.
 _POINTS = 400
-# Share of the points that coincide at the pose which must coincide elsewhere; by hand.
-_SHARE = 0.25
-# Shifts returned, at most; by hand.
+# Share of the points that coincide at the pose which must coincide elsewhere, of either kind, and of all; by hand.
+_SHARE, _OF_ALL = 0.25, 0.4
+# Copies of each kind returned, at most; by hand.
 _MOST = 4
-# Cells between two of them, at least; by hand.
+# Cells, or turns, between two of them, at least; by hand.
 _APART = 2
 # Fewest points that identify a place; by hand.
 _FEWEST = 20
@@ -34,87 +39,105 @@ _CHANCE = 10.0
 
 
 def copies(views: Views, T_target_source: Array, axes: Array) -> list[Array]:
-    """Poses (4, 4) beside a pose, shifted along the commonest surface, at which nearly as many points coincide.
+    """Poses (4, 4) beside a pose, at which nearly as many points coincide: shifted along the commonest surface or away
+    from it, or turned about a place where either cloud was seen from, or the origin of its frame.
 
-    Points that face the commonest axis `axes[0]` coincide anywhere (on a street, those of its ground), and do not
-    count. Of those that face the other two the same share must coincide each: along a corridor the floor does anyway.
-    Two points coincide in one cell of a grid.
+    Points that face the commonest axis `axes[0]` coincide anywhere along it (on a street, those of its ground), and
+    count only where the shift leads away from it. Of the others the same share must coincide for each axis: along a
+    corridor the floor does anyway. Two points coincide in one cell of a grid.
     """
-    source, target, spacing = views.source, views.target, views.spacing
-    frame = np.vstack([axes[1:], axes[:1]])  # the commonest direction last
-    cell = _CELL * spacing
-    reach = (round(_ACROSS / _CELL), round(_ALONG / _CELL))
-    axis = faced(source.normals[source.settling] @ T_target_source[:3, :3].T, axes)
-    rows, axis = source.settling[axis > 0][:_POINTS], axis[axis > 0][:_POINTS]
-    other = faced(target.normals, axes)
-    if len(rows) < _FEWEST or np.count_nonzero(other > 0) < _FEWEST:
+    place = _Place(views, T_target_source, axes)
+    if place.tells_nothing:
         return []
-    things = se3.apply(T_target_source, source.points[rows])
-    middle = things.mean(axis=0)
-    arms = things - middle
-    farthest = np.linalg.norm(arms, axis=1).max() + 2 * max(reach) * cell
-    turns = [arms @ se3.rotation_about(np.radians(deg) * axes[0]).T @ frame.T for deg in _TURNS_DEG]
-    share = np.full((len(turns), 2 * reach[0] + 1, 2 * reach[1] + 1), np.inf)
-    for facing in (1, 2):
-        held = (target.points[other == facing] - middle) @ frame.T
-        held = held[np.abs(held).max(axis=1) < farthest]
-        if len(held) == 0:
-            continue
-        cells = _Cells(held, cell)
-        met = _CHANCE + np.stack([cells.met(turned[axis == facing], reach) for turned in turns])
-        np.minimum(share, met / met[:, reach[0], reach[1]].max(), out=share)
-    best, turn = share.max(axis=0), share.argmax(axis=0)
-    poses = []
-    for i, j in _peaks(best):
-        shift = cell * np.array([i - reach[0], j - reach[1], 0]) @ frame
-        turned = se3.rotation_about(np.radians(_TURNS_DEG[turn[i, j]]) * axes[0])
-        poses.append(se3.about(middle, turned, shift) @ T_target_source)
-    return poses
+    return [M @ T_target_source for M in (*place.shifted(), *place.raised(), *place.turned())]
 
 
-def _peaks(share: Array) -> list[tuple[int, int]]:
-    # Shifts at which no less coincides than at those around, the best first, without the pose itself in the middle.
+class _Place:
+    # The source's points under a pose, those that face the commonest axis and others, and the target's.
+
+    def __init__(self, views: Views, T: Array, axes: Array) -> None:
+        source, target = views.source, views.target
+        facing = faced(source.normals[source.settling] @ T[:3, :3].T, axes)
+        kept = np.concatenate([np.flatnonzero(facing > 0)[:_POINTS], np.flatnonzero(facing == 0)[:_POINTS]])
+        self.axis, self.axes, self.cell = facing[kept], axes, _CELL * views.spacing
+        self.things = se3.apply(T, source.points[source.settling[kept]])
+        self.others, self.other_axis = target.points, faced(target.normals, axes)
+        self.tells_nothing = (
+            min(np.count_nonzero(rows > 0) for rows in (self.axis, self.other_axis)) < _FEWEST
+        )
+        origin = np.zeros(3)
+        own = se3.apply(T, np.array([source.centre, origin]))
+        self.centres = _apart([*own, target.centre, origin], 2.0 * self.cell)
+        self.up = axes[0] if views.up is None else views.up
+
+    def shifted(self) -> Iterator[Array]:
+        middle = self.things[self.axis > 0].mean(axis=0)
+        frame = np.vstack([self.axes[1:], self.axes[:1]])
+        reach = (_ACROSS, _ALONG)
+        turns = [se3.rotation_about(np.radians(deg) * self.axes[0]) for deg in _TURNS_DEG]
+        share = self._share((1, 2), frame, middle, turns, reach)
+        best, turn = share.max(axis=0), share.argmax(axis=0)
+        for i, j in _peaks(best):
+            shift = self.cell * np.array([i - reach[0], j - reach[1], 0]) @ frame
+            yield se3.about(middle, turns[turn[i, j]], shift)
+
+    def raised(self) -> Iterator[Array]:
+        middle = self.things.mean(axis=0)
+        share = self._share((0, 1, 2), self.axes[[1, 0, 2]], middle, [np.eye(3)], (0, _ALONG))[0]
+        for _, j in _peaks(share):
+            yield se3.from_rt(np.eye(3), self.cell * (j - _ALONG) * self.axes[0])
+
+    def turned(self) -> Iterator[Array]:
+        degrees = np.concatenate([[0.0], np.arange(_FIRST_DEG, 360.0 - _FIRST_DEG, _ROUND_DEG)])
+        turns = se3.rotation_about(np.radians(degrees)[:, None] * self.up)
+        things = self.things[self.axis > 0][: _POINTS // 2]
+        others = OccupiedCells(self.others[self.other_axis > 0], self.cell)
+        for centre in self.centres:
+            moved = (things - centre) @ np.swapaxes(turns, 1, 2) + centre
+            met = _CHANCE + others.hold(moved).sum(axis=1)
+            share = np.where(met >= _OF_ALL * met[0], met / met[0], 0.0)
+            share[0] = 0.0
+            for _, k in _peaks(share[None], centre=False):
+                yield se3.about(centre, turns[k], np.zeros(3))
+
+    def _share(
+        self,
+        kinds: Sequence[int],
+        frame: Array,
+        middle: Array,
+        turns: Sequence[Array],
+        reach: tuple[int, int],
+    ) -> Array:
+        # Of the points that coincide at the pose the least share of any kind, (turns, 2 rows + 1, 2 columns + 1).
+        arms = self.things - middle
+        farthest = np.linalg.norm(arms, axis=1).max() + 2 * max(reach) * self.cell
+        share = np.full((len(turns), 2 * reach[0] + 1, 2 * reach[1] + 1), np.inf)
+        for kind in kinds:
+            held = (self.others[self.other_axis == kind] - middle) @ frame.T
+            held = held[np.abs(held).max(axis=1) < farthest]
+            if len(held) == 0:
+                continue
+            cells, own = OccupiedCells(held, self.cell), arms[self.axis == kind]
+            met = _CHANCE + np.stack([cells.met(own @ turn.T @ frame.T, reach) for turn in turns])
+            np.minimum(share, met / met[:, reach[0], reach[1]].max(), out=share)
+        return share
+
+
+def _apart(places: Sequence[Array], least: float) -> list[Array]:
+    kept: list[Array] = []
+    for place in places:
+        if all(np.linalg.norm(place - other) > least for other in kept):
+            kept.append(place)
+    return kept
+
+
+def _peaks(share: Array, *, centre: bool = True) -> list[tuple[int, int]]:
+    # Where no less coincides than around, the best first; without the pose itself, where it is at the centre.
     from scipy.ndimage import maximum_filter
 
-    i, j = (n // 2 for n in share.shape)
     peak = (share == maximum_filter(share, 2 * _APART + 1, mode="constant")) & (share >= _SHARE)
-    peak[i - _APART : i + _APART + 1, j - _APART : j + _APART + 1] = False
+    if centre:
+        peak[tuple(slice(max(n // 2 - _APART, 0), n // 2 + _APART + 1) for n in share.shape)] = False
     rows, columns = np.nonzero(peak)
     order = np.argsort(-share[rows, columns], kind="stable")[:_MOST]
     return list(zip(rows[order].tolist(), columns[order].tolist(), strict=True))
-
-
-class _Cells:
-    # The cells (C, 3) that hold a point, sorted by their keys: a full grid of a sparse cloud would take gigabytes.
-
-    def __init__(self, points: Array, cell: float) -> None:
-        cells = np.floor(points / cell).astype(np.int64)
-        self._cell, self._origin = cell, cells.min(axis=0)
-        self._size = cells.max(axis=0) - self._origin + 1
-        self._keys = np.unique(self._key((cells - self._origin).T))
-
-    def _key(self, cells: NDArray[np.int64]) -> NDArray[np.int64]:
-        i, j, k = cells
-        return (k * self._size[0] + i) * self._size[1] + j
-
-    def met(self, points: Array, reach: tuple[int, int]) -> NDArray[np.int64]:
-        """How many of the points (n, 3) fall into these cells under each shift of up to so many rows and columns."""
-        across, along, height = (np.floor(points / self._cell).astype(np.int64) - self._origin).T
-        rows, columns = reach
-        shift = np.arange(-rows, rows + 1)
-        # Cells of one row follow one another among the keys: one stretch for each point and shift across.
-        moved = across[:, None] + shift
-        point, nth = np.nonzero(
-            (moved >= 0) & (moved < self._size[0]) & ((height >= 0) & (height < self._size[2]))[:, None]
-        )
-        i, j, k = moved[point, nth], along[point], height[point]
-        lowest, highest = np.maximum(j - columns, 0), np.minimum(j + columns, self._size[1] - 1)
-        start = np.searchsorted(self._keys, self._key(np.array([i, lowest, k])))
-        end = np.searchsorted(self._keys, self._key(np.array([i, highest, k])), side="right")
-        many = np.where(lowest <= highest, end - start, 0)
-        at = np.repeat(start - (np.cumsum(many) - many), many) + np.arange(many.sum())
-        column = self._keys[at] % self._size[1] - np.repeat(j, many) + columns
-        shape = (2 * rows + 1, 2 * columns + 1)
-        return np.bincount(np.repeat(nth, many) * shape[1] + column, minlength=shape[0] * shape[1]).reshape(
-            shape
-        )

@@ -30,15 +30,17 @@ DOUBTED = 0.9
 SIZE_GAIN = 0.12
 # Of sparse clouds, points that agree off the commonest surface before a pose is "ok": chance makes a handful agree.
 SPARSE, _AGREE = 1000, 20
-# Points off the commonest surface that are seen through, from which their being more than agree is no chance; by hand. Of
-# 279 right poses on `sim:val`, refined or not, none has more than half as many. Where the source is stretched or of another
-# size, the ground's relief may still agree, and nothing else does.
+# Points off the commonest surface that are seen through, from which it is no chance that more are than agree; by hand.
+# Of 279 right poses on `sim:val`, refined or not, none has more than half as many. Where the source is stretched, or of
+# another size, the ground's relief may still agree, and nothing else does.
 _THROUGH = 20
 # Log-odds by which the best rival must lie behind for an "ok": its own are no surer than the pose's. Of 27 answers to
 # training pairs between "ok" and this bound two were wrong, of 800 beyond it none by a rival.
 CLEAR = 3.5
 # Log-odds by which a rival may be likelier and still count as equal; by hand.
 _EQUAL = 1.0
+# Log-odds from which a rival is told of, however far it lies behind: a map may hold a place twice.
+LIKELY = 0.0
 # Evidence that speaks for a pose the larger it is (+1), or against it (-1); 0 may do either.
 SPEAKS = {
     "agreement_least": 1,

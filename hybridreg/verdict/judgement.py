@@ -25,7 +25,7 @@ from hybridreg.scene import Scene
 from hybridreg.search import rivals, settle
 from hybridreg.search.hypothesis import Hypothesis, of_pose
 from hybridreg.search.ranking import best, differs, told_apart
-from hybridreg.verdict.confidence import CLEAR, DOUBTED, Word, confidence, word
+from hybridreg.verdict.confidence import CLEAR, DOUBTED, LIKELY, Word, confidence, word
 from hybridreg.verdict.words import reasons
 
 Array = NDArray[np.float64]
@@ -88,7 +88,7 @@ class Judgement:
     centre : (3,) float64
         See `hybridreg.evidence.information.Information`.
     rivals : (r, 4, 4) float64
-        Poses that explain the data nearly as well, best first.
+        Poses that explain the data nearly as well, or would be likely were there no better one, best first.
     """
 
     verdict: Word
@@ -284,4 +284,6 @@ def _unseen(scene: Scene) -> dict[str, str]:
 
 
 def _close(found: list[Hypothesis], support: float) -> Array:
-    return np.array([rival.T for rival in found if rival.log_odds > support - CLEAR]).reshape(-1, 4, 4)
+    # Those that do nearly as well, and those that would be likely if the pose were not known.
+    told = min(support - CLEAR, LIKELY)
+    return np.array([rival.T for rival in found if rival.log_odds > told]).reshape(-1, 4, 4)

@@ -11,7 +11,7 @@ from hybridreg.evidence.agreement import Agreement
 from hybridreg.evidence.evidence import Evidence
 from hybridreg.evidence.information import Information
 from hybridreg.resolution import Tolerance
-from hybridreg.verdict.confidence import CLEAR, SIZE_GAIN, SPARSE, mostly_through
+from hybridreg.verdict.confidence import CLEAR, LIKELY, SIZE_GAIN, SPARSE, mostly_through
 
 # The bounds beyond which a number is worth a sentence; nine in ten right poses of simulated scenes stay within them.
 # Share of the visible points that violates free space.
@@ -82,8 +82,8 @@ def _against(
         )
     elif mostly_through(evidence):
         yield (
-            f"free space is violated: beside the commonest surface {evidence.through_rare:.0f} points are seen through, and "
-            f"{evidence.agreed_rare:.0f} agree; is a cloud scaled, stretched or bent?"
+            f"free space is violated: off the commonest surface {evidence.through_rare:.0f} points are seen through, "
+            f"and {evidence.agreed_rare:.0f} agree; is a cloud scaled, stretched or bent?"
         )
     elif through_walls:
         yield f"free space is violated: the scanners saw through {evidence.looked_through_rare:.0%} of the walls"
@@ -95,6 +95,11 @@ def _against(
         yield f"another pose explains the data better (its support is higher by {margin:.2f}; see rivals)"
     elif margin > -CLEAR:
         yield f"another pose explains the data nearly as well (its support is lower by {-margin:.2f}; see rivals)"
+    elif evidence.support + margin > LIKELY:
+        yield (
+            f"another pose is likely by itself (its support is lower by {-margin:.2f}; see rivals): "
+            "does a cloud hold a place twice?"
+        )
     if held.weakest < WEAK:
         yield f"the pose is poorly constrained {held.words}: {held.weakest:.1%} of the surfaces' information"
     if evidence.compared < SPARSE:
