@@ -28,6 +28,8 @@ _NEARLY_ALL = 0.98
 _TOLD = 5_000
 # The sensor's height over the floor, and the walls' over the sensor: of the smaller cloud's extent; by hand.
 _HEIGHT = 1.0 / 6.0
+# Points through which walls are drawn, at most: a scan seldom has more, a cloud that was flattened has; by hand.
+_WALLS = 5_000
 # Beams under which floor is drawn, at most; by hand.
 _BEAMS = 3_000
 # Without beams: points of floor beside each point, and how far beside it, steps; by hand.
@@ -76,15 +78,18 @@ def _places(cloud: PointCloud, rows: NDArray[np.int64]) -> Array:
 
 def _raised(cloud: PointCloud, up: Array, height: float, step: float, rng: np.random.Generator) -> PointCloud:
     levels = np.arange(-height, height + 0.5 * step, step)
-    walls = (cloud.points + levels[:, None, None] * up).reshape(-1, 3)
-    beneath, below = _under_beams(cloud, step) if len(cloud.seen.places) else _beside(cloud, up, step, rng)
+    some = sample(np.arange(len(cloud)), _WALLS)
+    walls = (cloud.points[some] + levels[:, None, None] * up).reshape(-1, 3)
+    beneath, below = (
+        _under_beams(cloud, step) if len(cloud.seen.places) else _beside(cloud, some, up, step, rng)
+    )
     lift = _UNEVEN * step * rng.uniform(-1.0, 1.0, len(below)) - height
     # The cloud's own points first: what the caller says of its rows stays true.
     points = np.concatenate([cloud.points, walls, beneath + lift[:, None] * up])
     points.setflags(write=False)
     seen = cloud.seen
     if seen.of_point is not None:
-        rows = np.concatenate([np.tile(np.arange(len(cloud)), 1 + len(levels)), below])
+        rows = np.concatenate([np.arange(len(cloud)), np.tile(some, len(levels)), below])
         seen = seen._replace(of_point=seen.of_point[rows])
     return replace(cloud, points=points, said=seen, kept=None if cloud.kept is None else {})
 
@@ -102,9 +107,9 @@ def _under_beams(cloud: PointCloud, step: float) -> tuple[Array, NDArray[np.int6
 
 
 def _beside(
-    cloud: PointCloud, up: Array, step: float, rng: np.random.Generator
+    cloud: PointCloud, some: NDArray[np.int64], up: Array, step: float, rng: np.random.Generator
 ) -> tuple[Array, NDArray[np.int64]]:
     # At random to either side of each point: one of the two was in some sensor's view.
-    rows = np.repeat(np.arange(len(cloud)), _BESIDE)
+    rows = np.repeat(some, _BESIDE)
     aside = _ASIDE * step * rng.uniform(-1.0, 1.0, (len(rows), 3))
     return cloud.points[rows] + aside - (aside @ up)[:, None] * up, rows

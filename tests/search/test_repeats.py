@@ -6,9 +6,11 @@ from __future__ import annotations
 import tracemalloc
 
 import numpy as np
+import pytest
 
 from hybridreg.evidence import views
 from hybridreg.evidence.agreement import compare
+from hybridreg.geometry import se3
 from hybridreg.pair import Pair
 from hybridreg.scene import Scene
 from hybridreg.search.occupied_cells import OccupiedCells
@@ -65,3 +67,29 @@ def test_a_place_farther_along_a_corridor_is_found_though_its_floor_is_alike_all
     off = [float(np.linalg.norm(T[:3, 3] - right[:3, 3] - [3.0, 0.0, 0.0])) for T in found]
     assert 20.0 * both.spacing < 3.0
     assert min(off) < 0.25
+
+
+def tower(turn_deg: float, up: float, seed: int) -> np.ndarray:
+    """A yard of boxes, seen from its middle."""
+    rng, made = np.random.default_rng(7), np.random.default_rng(seed)
+    parts = [np.c_[made.uniform(-12.0, 12.0, (6000, 2)), np.full(6000, -1.7)]]
+    for _ in range(14):
+        centre, size = rng.uniform(-10.0, 10.0, 2), rng.uniform(0.6, 2.0)
+        box = made.uniform(-0.5, 0.5, (500, 3))
+        face = made.integers(0, 2, 500)
+        box[np.arange(500), face] = np.sign(box[np.arange(500), face]) * 0.5
+        parts.append(np.c_[centre + size * box[:, :2], 2.5 * (box[:, 2] + 0.5) - 1.7])
+    return se3.apply(se3.yaw(turn_deg), np.concatenate(parts)) + [0.0, 0.0, up]
+
+
+@pytest.mark.parametrize(("turn_deg", "up"), [(40.0, 0.0), (155.0, 0.0), (0.0, 3.6)])
+def test_a_map_that_holds_a_place_turned_or_raised_shows_both(turn_deg: float, up: float) -> None:
+    target = np.concatenate([tower(0.0, 0.0, seed=0), tower(turn_deg, up, seed=1)])
+    both = views.of(Scene.on_cells(Pair.of(tower(0.0, 0.0, seed=2), target), 0.25))
+    other = se3.yaw(turn_deg)
+    other[2, 3] = up
+    found = copies(both, np.eye(4), compare(both, np.eye(4)).axes)
+    off = [
+        (se3.angle_deg(T[:3, :3] @ other[:3, :3].T), np.linalg.norm(T[:3, 3] - other[:3, 3])) for T in found
+    ]
+    assert any(degrees < 2.0 and metres < 0.5 for degrees, metres in off)

@@ -121,6 +121,13 @@ def test_no_pose_that_turns_the_world_over_or_fits_at_another_size_is_ok(evidenc
     assert word(confidence(replace(evidence, size_gain=0.3))) != "ok"
 
 
+@given(whole, st.floats(20.0, 3000.0), st.floats(0.1, 1000.0))
+def test_no_pose_is_ok_at_which_more_is_seen_through_than_agrees(
+    evidence: Evidence, agreed: float, more: float
+) -> None:
+    assert word(confidence(replace(evidence, agreed_rare=agreed, through_rare=agreed + more))) != "ok"
+
+
 @given(odds, st.floats(NO_RIVAL, 10.0))
 def test_a_pose_is_no_likelier_than_against_its_rival_alone(odds: float, margin: float) -> None:
     assert believed(odds, margin) <= 1.0 / (1.0 + np.exp(margin))

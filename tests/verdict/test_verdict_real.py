@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import hybridreg as hr
 from hybridreg.classical.voxel import VoxelGrid
 from hybridreg.cloud import PointCloud
 from hybridreg.evidence import views
@@ -82,3 +83,37 @@ def test_different_places_are_failed(real_data: Path) -> None:
 def _gaps(scene: Scene, T: np.ndarray) -> np.ndarray:
     source, target = views.of(scene).source, views.of(scene).target
     return target.tree.query(se3.apply(T, source.points), distance_upper_bound=0.5)[0]
+
+
+@pytest.mark.parametrize("factors", [0.9, 0.94, np.array([1.0, 0.93, 1.0])])
+def test_a_source_of_another_size_is_not_ok_though_the_relief_of_the_ground_fits(
+    real_data: Path, factors: float | np.ndarray
+) -> None:
+    name = "kitti-city-20-to-0"
+    if not (real_data / name).is_dir():
+        pytest.skip(f"no pair {name}")
+    source, target = (np.load(real_data / name / f"{side}.npz")["xyz"] for side in ("source", "target"))
+    result = hr.register(se3.apply(se3.yaw(40.0), source.astype(float)) * factors, target)
+    assert result.verdict != "ok"
+    assert "free space is violated" in " ".join(result.reasons)
+
+
+@pytest.mark.parametrize(
+    ("turn_deg", "shift"), [(0.0, (20.0, 0.0, 0.0)), (0.0, (0.0, 0.0, 3.0)), (30.0, (0.0, 0.0, 0.0))]
+)
+def test_a_map_that_holds_the_place_twice_shows_both(
+    real_data: Path, turn_deg: float, shift: tuple[float, float, float]
+) -> None:
+    name = "kitti-city-20-to-0"
+    if not (real_data / name).is_dir():
+        pytest.skip(f"no pair {name}")
+    source, target = (
+        np.load(real_data / name / f"{side}.npz")["xyz"].astype(float) for side in ("source", "target")
+    )
+    copy = se3.yaw(turn_deg)
+    copy[:3, 3] = shift
+    result = hr.register(source, np.concatenate([target, se3.apply(copy, target)]))
+    truth = truth_of(real_data, name)
+    for right in (truth, copy @ truth):
+        off = [right @ se3.inverse(T) for T in (result.transformation, *result.rivals)]
+        assert any(se3.angle_deg(M[:3, :3]) < 2.0 and np.linalg.norm(M[:3, 3]) < 1.0 for M in off)
