@@ -101,12 +101,18 @@ class Pipeline(Stage):
         return cls(**presets.read(path))
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Write the pipeline as TOML, whole or not at all."""
-        presets.write(path, self.to_spec())
+        """Write the pipeline as TOML, whole or not at all.
 
-    def to_spec(self) -> dict[str, Any]:
-        """One table a slot, and one of the prior where there is one."""
-        slots = {slot: spec.to_table(getattr(self, slot), slot) for slot in SLOTS}
+        Raises
+        ------
+        ValueError
+            A stage holds what no file can hold, such as a network.
+        """
+        presets.write(path, self.to_spec(for_file=True))
+
+    def to_spec(self, *, for_file: bool = False) -> dict[str, Any]:
+        """One table a slot, and one of the prior where there is one; see `hybridreg.spec.to_table`."""
+        slots = {slot: spec.to_table(getattr(self, slot), slot, for_file=for_file) for slot in SLOTS}
         return slots if self.prior is None else {**slots, "prior": self.prior.to_table()}
 
     def swap(self, **stages: Any) -> Pipeline:

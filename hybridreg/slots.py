@@ -48,6 +48,8 @@ class Refine(Protocol):
     def __call__(self, scene: Scene, pose: Pose, /) -> Pose: ...
 
 
+# By how much a pose's rotation may be off before that is told: from float32, or a motion that drifted; by hand.
+_NO_ROTATION = 1e-2
 # What a stage of each slot returns, and how a person makes one.
 _KINDS: dict[str, tuple[type, str]] = {
     "downsample": (Scene, "hybridreg.Scene.on_cells(pair, 0.5) makes one"),
@@ -71,7 +73,8 @@ def checked(slot: str, stage: Any, value: Any, scene: Scene | None = None) -> An
     ------
     ValueError
         It is of another type than the slot's, or an overlap of another shape or out of [0, 1]; the message names slot
-        and stage and says what to return. A pose of another shape is noted, and counts as none.
+        and stage and says what to return. A pose of another shape, or that is not finite, counts as none, which the
+        reasons say; one that is no rigid motion is noted.
     """
     name = getattr(stage, "__name__", type(stage).__name__)
     kind, cure = _KINDS[slot]
@@ -91,11 +94,21 @@ def checked(slot: str, stage: Any, value: Any, scene: Scene | None = None) -> An
                 raise ValueError(
                     f"{slot}: {name} returned an overlap of the {side} that leaves [0, 1] or is not finite; {cure}"
                 )
-    if isinstance(value, Pose) and scene is not None and np.shape(value.T) != (4, 4):
-        scene.note(
-            f"{slot}: {name} returned a pose of shape {np.shape(value.T)}, which counts as none; {cure}"
-        )
+    if isinstance(value, Pose) and scene is not None:
+        _check_pose(f"{slot}: {name}", value, cure, scene)
     return value
+
+
+def _check_pose(whose: str, pose: Pose, cure: str, scene: Scene) -> None:
+    T = np.asarray(pose.T)
+    if T.shape != (4, 4) or not np.isfinite(T).all():
+        wrong = f"of shape {T.shape}" if T.shape != (4, 4) else "that is not finite"
+        scene.note(f"{whose} returned a pose {wrong}, which counts as none; {cure}")
+        scene.explanations.append(f"{whose} returned a pose {wrong}")
+    elif pose.found and np.abs(T[:3, :3] @ T[:3, :3].T - np.eye(3)).max() > _NO_ROTATION:
+        scene.note(
+            f"{whose} returned a pose whose upper left 3x3 block is no rotation; the nearest one was taken"
+        )
 
 
 def _told(value: Any) -> str:

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import dataclasses
 import typing
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -22,8 +22,16 @@ from hybridreg.slots import SLOTS
 from hybridreg.stage import own_params
 
 
-def to_table(stage: Any, slot: str | None = None) -> dict[str, Any]:
-    """Table of a stage; inside its own slot the short name suffices."""
+def to_table(stage: Any, slot: str | None = None, *, for_file: bool = False) -> dict[str, Any]:
+    """Table of a stage; inside its own slot the short name suffices.
+
+    What no table can hold, such as a network, is named by its class, unless the table is `for_file`.
+
+    Raises
+    ------
+    ValueError
+        A field's value that no file can hold, naming stage and field.
+    """
     registered = registry.name_of(stage)
     if registered is None:
         named = stage if hasattr(stage, "__qualname__") else type(stage)
@@ -31,24 +39,34 @@ def to_table(stage: Any, slot: str | None = None) -> dict[str, Any]:
     else:
         name = registered.removeprefix(f"{slot}.") if slot else registered
     fields = own_params(stage) if dataclasses.is_dataclass(stage) else {}
+
+    def other(value: Any, key: str) -> str:
+        if for_file:
+            raise ValueError(
+                f"{name}: {key} is a {type(value).__name__}, which no file holds; let the field be what it is made "
+                "from, such as the path of a network's weights"
+            )
+        return f"{type(value).__module__}:{type(value).__qualname__}"
+
     # TOML has no null; a field left out takes its default, which is None wherever a field may be None.
-    return {"stage": name, **{key: _plain(value, key) for key, value in fields.items() if value is not None}}
+    plain = {key: _plain(value, key, for_file, other) for key, value in fields.items() if value is not None}
+    return {"stage": name, **plain}
 
 
-def _plain(value: Any, key: str) -> Any:
+def _plain(value: Any, key: str, for_file: bool, other: Callable[[Any, str], str]) -> Any:
     if key in SLOTS and callable(value):
-        return to_table(value, key)
+        return to_table(value, key, for_file=for_file)
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
-        return to_table(value)
+        return to_table(value, for_file=for_file)
     if isinstance(value, Mapping):
-        return {slot: _plain(stage, slot) for slot, stage in value.items()}
+        return {slot: _plain(stage, slot, for_file, other) for slot, stage in value.items()}
     if isinstance(value, (tuple, list, np.ndarray)):
-        return [_plain(item, "") for item in value]
+        return [_plain(item, "", for_file, other) for item in value]
     if isinstance(value, np.generic):
         return value.item()
     if isinstance(value, (str, int, float, bool)):
         return value
-    raise ValueError(f"{value!r} of type {type(value).__name__} cannot be written to a table")
+    return other(value, key)
 
 
 def from_table(table: Any, slot: str | None = None) -> Any:

@@ -392,3 +392,62 @@ def test_result_is_written_whole(courtyard: tuple[hr.Pair, np.ndarray], tmp_path
     assert stored["spec"]["refine"]["stage"] == "icp"
     with pytest.raises(ValueError, match=r"\.json \(everything\) or \.txt"):
         result.save(tmp_path / "result.pkl")
+
+
+def _refining(change: Any) -> Any:
+    return lambda scene, pose: change(pose)
+
+
+def _not_finite(pose: Pose) -> Pose:
+    return Pose(np.full((4, 4), np.nan))
+
+
+def test_a_pose_that_is_not_finite_is_told_by_its_stage() -> None:
+    result = hr.Pipeline(match="none", estimate="identity", refine=_refining(_not_finite)).run(
+        testing.sample_pair()[0]
+    )
+    assert (result.verdict, result.found) == ("failed", False)
+    assert result.reasons[0].endswith("returned a pose that is not finite")
+
+
+def test_a_pose_that_is_no_rigid_motion_is_noted() -> None:
+    scaled = _refining(lambda pose: dataclasses.replace(pose, T=pose.T @ np.diag([2.0, 2.0, 2.0, 1.0])))
+    result = hr.Pipeline(match="none", estimate="identity", refine=scaled).run(testing.sample_pair()[0])
+    assert any("no rotation; the nearest one was taken" in note for note in result.notes)
+
+
+def test_matches_that_are_not_finite_or_weigh_less_than_nothing_are_refused() -> None:
+    points = np.zeros((3, 3))
+    with pytest.raises(ValueError, match=r"target is not finite in 1 of 3 rows \(the first is row 1\)"):
+        hr.Correspondences.of(points, points + [[0.0], [np.nan], [0.0]])
+    with pytest.raises(ValueError, match=r"a weight is -2"):
+        hr.Correspondences.of(points, points, [1.0, -2.0, 1.0])
+
+
+class Silent:
+    """A matcher that does not say what it gives."""
+
+    def __call__(self, scene: Any, overlap: Any) -> hr.Correspondences:
+        return hr.Correspondences.none()
+
+
+def test_a_matcher_that_does_not_tell_is_trusted() -> None:
+    hr.Pipeline(match=Silent(), estimate="ransac")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Holds:
+    """A refinement that holds what no file can."""
+
+    network: Any
+
+    def __call__(self, scene: Any, pose: Pose) -> Pose:
+        return pose
+
+
+@pytest.mark.parametrize("held", [object(), {1, 2}, Path("weights"), len])
+def test_a_stage_may_hold_what_no_file_can(tmp_path: Path, held: Any) -> None:
+    pipe = hr.Pipeline(match="none", estimate="identity", refine=Holds(network=held))
+    assert type(held).__name__ in pipe.run(testing.sample_pair()[0]).spec["refine"]["network"]
+    with pytest.raises(ValueError, match=r"Holds: network is a .*, which no file holds"):
+        pipe.save(tmp_path / "p.toml")

@@ -3,16 +3,20 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import random
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 import pytest
 
 from hybridreg import registry, testing
+from hybridreg.geometry import se3
 from hybridreg.matches import Correspondences, Overlap, Pose
-from hybridreg.scene import Scene
+from hybridreg.pair import Pair
+from hybridreg.scene import Level, Scene
 from hybridreg.stage import Stage
+from hybridreg.testing import stage_checks
 
 
 def built_in() -> list[str]:
@@ -96,3 +100,79 @@ def test_the_sample_pair_has_the_pose_it_claims() -> None:
     on, off = (measure(scene.source.points, scene.target.points, T, 0.4).fitness for T in (truth, np.eye(4)))
     assert on > 0.7
     assert off < on - 0.1, "a pose that nothing tells from the identity tests nothing"
+
+
+def _refine(change: Any) -> Any:
+    @dataclass(frozen=True, kw_only=True)
+    class Refiner:
+        def __call__(self, scene: Scene, pose: Pose) -> Pose:
+            return change(pose)
+
+    return Refiner()
+
+
+def _moved_in_place(pose: Pose) -> Pose:
+    pose.T[0, 3] += 0.1
+    return Pose(pose.T.copy())
+
+
+@pytest.mark.parametrize(
+    ("change", "check", "words"),
+    [
+        (_moved_in_place, stage_checks.check_output, "the pose changed in place"),
+        (lambda pose: Pose(se3.inverse(pose.T)), stage_checks.check_near_truth, "leads from"),
+        (lambda pose: Pose.unknown(), stage_checks.check_near_truth, "loses a pose"),
+    ],
+)
+def test_a_refinement_that_leads_away_is_caught(change: Any, check: Any, words: str) -> None:
+    with pytest.raises(AssertionError, match=words):
+        check(_refine(change), "refine")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Swapped:
+    """A matcher that confuses the clouds, or promises what it does not give."""
+
+    fault: str
+    gives = frozenset({"matches", "group"})
+
+    def __call__(self, scene: Scene, overlap: Overlap) -> Correspondences:
+        source, target = scene.source.points[:20], scene.target.points[:20]
+        if self.fault == "swapped":
+            source, target = target + [40.0, 0.0, 0.0], source
+        if self.fault == "random":
+            random.random()
+        group = None if self.fault == "no group" else np.zeros(20, dtype=np.int64)
+        return Correspondences(source=source, target=target, weight=np.ones(20), group=group)
+
+
+@pytest.mark.parametrize(
+    ("fault", "check", "words"),
+    [
+        ("no group", stage_checks.check_output, "promises groups and gives none"),
+        ("swapped", stage_checks.check_output, "are the clouds swapped"),
+        ("random", stage_checks.check_seed, "the global generator of random was used"),
+    ],
+)
+def test_a_matcher_that_breaks_its_word_is_caught(fault: str, check: Any, words: str) -> None:
+    with pytest.raises(AssertionError, match=words):
+        check(Swapped(fault=fault), "match")
+    check(Swapped(fault=""), "match")
+
+
+def test_an_overlap_that_depends_on_the_targets_order_is_caught() -> None:
+    def first_half(scene: Scene) -> Overlap:
+        n = len(scene.target)
+        return Overlap(np.ones(len(scene.source)), (np.arange(n) < n // 2).astype(float))
+
+    with pytest.raises(AssertionError, match="the target's overlap depends on the order"):
+        stage_checks.check_permuted_points(first_half, "overlap")
+
+
+def test_a_downsampling_that_leaves_no_target_is_caught() -> None:
+    def empty(pair: Pair) -> Scene:
+        whole = Scene.on_cells(pair, 0.5)
+        return replace(whole, target=Level(points=np.zeros((0, 3)), spacing=0.5))
+
+    with pytest.raises(AssertionError, match="target: no point is left"):
+        stage_checks.check_output(empty, "downsample")

@@ -6,7 +6,9 @@ from __future__ import annotations
 import copy
 import inspect
 import pickle
-from collections.abc import Callable
+import random
+import sys
+from collections.abc import Callable, Collection
 from typing import Any
 
 import numpy as np
@@ -20,6 +22,10 @@ from hybridreg.testing.small_inputs import sample_scene, true_matches
 
 Array = NDArray[np.float64]
 Check = Callable[[Any, str], None]
+# Metres that a refinement may end farther from the true pose than twice its start.
+_ASIDE = 0.5
+# Spacings within which a match lies at some point of its cloud.
+_AT_A_POINT = 2.0
 
 
 def checks() -> list[Check]:
@@ -30,6 +36,7 @@ def checks() -> list[Check]:
         check_output,
         check_seed,
         check_permuted_points,
+        check_near_truth,
         check_rigid_motion,
         check_no_overlap,
         check_no_matches,
@@ -97,34 +104,55 @@ def check_pickle_and_clone(stage: Any, slot: str) -> None:
 
 def check_output(stage: Any, slot: str) -> None:
     """Returns the slot's type, with the promised shapes; leaves its inputs unchanged."""
-    scene, _ = sample_scene()
-    before = scene.source.points.copy(), scene.target.points.copy()
-    out = _run(stage, slot, scene)
-    _valid(out, slot, scene)
-    assert np.array_equal(before[0], scene.source.points), "the source's points were changed in place"
-    assert np.array_equal(before[1], scene.target.points), "the target's points were changed in place"
+    scene, truth = sample_scene()
+    matches, pose = true_matches(scene, truth), Pose(truth @ se3.yaw(1.0))
+    given = {
+        "the source's points": scene.source.points,
+        "the target's points": scene.target.points,
+        "the matches": np.hstack([matches.source, matches.target, matches.weight[:, None]]),
+        "the pose": pose.T,
+    }
+    before = {name: array.copy() for name, array in given.items()}
+    out = _run(stage, slot, scene, matches, pose)
+    called = slot != "match" or _takes_overlap(stage)
+    _valid(out, slot, scene, promised=getattr(stage, "gives", ()) if called else ())
+    given["the matches"] = np.hstack([matches.source, matches.target, matches.weight[:, None]])
+    for name, array in given.items():
+        assert np.array_equal(before[name], array), f"{name} changed in place"
 
 
 def check_seed(stage: Any, slot: str) -> None:
     """The same generator gives the same bits, and nothing else is random."""
-    state = np.random.get_state()[1].copy()  # type: ignore[index]
+    states = _global_states()
     _same(_run(stage, slot), _run(stage, slot))
-    assert np.array_equal(state, np.random.get_state()[1]), "numpy's global generator was used"  # type: ignore[index]
+    for name, state in _global_states().items():
+        assert states.get(name, state) == state, f"the global generator of {name} was used"
+
+
+def _global_states() -> dict[str, bytes]:
+    states = {"random": repr(random.getstate()).encode(), "numpy": np.random.get_state()[1].tobytes()}  # type: ignore[union-attr,index]
+    if "torch" in sys.modules:
+        states["torch"] = sys.modules["torch"].get_rng_state().numpy().tobytes()
+    return states
 
 
 def check_permuted_points(stage: Any, slot: str) -> None:
-    """The order of the points does not matter except for random sampling."""
+    """The order of either cloud's points does not matter except for random sampling."""
     scene, _ = sample_scene()
-    order = np.random.default_rng(1).permutation(len(scene.source))
-    shuffled = Level(
-        points=scene.source.points[order], spacing=scene.source.spacing, viewpoint=scene.source.viewpoint
+    orders = [
+        np.random.default_rng(seed).permutation(len(level))
+        for seed, level in ((1, scene.source), (2, scene.target))
+    ]
+    source, target = (
+        Level(points=level.points[order], spacing=level.spacing, viewpoint=level.viewpoint)
+        for level, order in zip((scene.source, scene.target), orders, strict=True)
     )
-    other = Scene(pair=scene.pair, source=shuffled, target=scene.target)
+    other = Scene(pair=scene.pair, source=source, target=target)
     one, two = _run(stage, slot, scene), _run(stage, slot, other)
     if slot == "overlap":
-        assert np.allclose(one.source[order], two.source, atol=1e-6), (
-            "the source's overlap depends on the order"
-        )
+        for side, order in zip(("source", "target"), orders, strict=True):
+            same = np.allclose(getattr(one, side)[order], getattr(two, side), atol=1e-6)
+            assert same, f"the {side}'s overlap depends on the order"
     if slot == "match":
         assert abs(len(one) - len(two)) <= 0.2 * max(len(one), 20), (
             "the number of matches depends on the order"
@@ -134,6 +162,17 @@ def check_permuted_points(stage: Any, slot: str) -> None:
         assert error < 0.5 or not (one.found and two.found), (
             f"the pose moves by {error:.2f} m with the order of points"
         )
+
+
+def check_near_truth(stage: Any, slot: str) -> None:
+    """A refinement that begins a degree beside the true pose does not lead away from it."""
+    if slot == "refine":
+        scene, truth = sample_scene()
+        start = truth @ se3.yaw(1.0)
+        out = stage(scene, Pose(start.copy()))
+        assert out.found, "loses a pose that is nearly right"
+        begun, ended = _error_m(start, truth, scene), _error_m(out.T, truth, scene)
+        assert ended < 2.0 * begun + _ASIDE, f"leads from {begun:.2f} m beside the true pose to {ended:.2f} m"
 
 
 def check_rigid_motion(stage: Any, slot: str) -> None:
@@ -179,10 +218,16 @@ def check_one_match(stage: Any, slot: str) -> None:
     if slot == "estimate":
         scene, truth = sample_scene()
         one = true_matches(scene, truth, n=1)
-        _valid(stage(scene, one, np.random.default_rng(0)), slot, scene, n_matches=1)
+        _valid(stage(scene, one, np.random.default_rng(0)), slot, scene)
 
 
-def _run(stage: Any, slot: str, scene: Scene | None = None) -> Any:
+def _run(
+    stage: Any,
+    slot: str,
+    scene: Scene | None = None,
+    matches: Correspondences | None = None,
+    pose: Pose | None = None,
+) -> Any:
     made, truth = sample_scene()
     scene = scene or made
     if slot == "downsample":
@@ -194,8 +239,10 @@ def _run(stage: Any, slot: str, scene: Scene | None = None) -> Any:
             return Correspondences.none()
         return stage(scene, Overlap.full(len(scene.source), len(scene.target)))
     if slot == "estimate":
-        return stage(scene, true_matches(made, truth), np.random.default_rng(7))
-    return stage(scene, Pose(truth @ se3.yaw(1.0)))
+        return stage(
+            scene, true_matches(made, truth) if matches is None else matches, np.random.default_rng(7)
+        )
+    return stage(scene, pose or Pose(truth @ se3.yaw(1.0)))
 
 
 def _takes_overlap(stage: Any) -> bool:
@@ -205,11 +252,16 @@ def _takes_overlap(stage: Any) -> bool:
     return not isinstance(stage, GivenMatches) and bool(inspect.signature(stage).parameters)
 
 
-def _valid(out: Any, slot: str, scene: Scene, n_matches: int | None = None) -> None:
+def _valid(out: Any, slot: str, scene: Scene, promised: Collection[str] = ()) -> None:
     if slot == "downsample":
         assert isinstance(out, Scene), f"returned {type(out).__name__}, not a Scene"
-        assert out.source.points.shape[1] == 3
-        assert out.source.spacing > 0, "the spacing must be a positive length"
+        for side, level in (("source", out.source), ("target", out.target)):
+            assert level.points.ndim == 2, f"{side}: points of shape {level.points.shape}, expected (n, 3)"
+            assert level.points.shape[1] == 3, (
+                f"{side}: points of shape {level.points.shape}, expected (n, 3)"
+            )
+            assert len(level) > 0, f"{side}: no point is left"
+            assert level.spacing > 0, f"{side}: the spacing must be a positive length"
     elif slot == "overlap":
         for side, level in (("source", scene.source), ("target", scene.target)):
             p = getattr(out, side)
@@ -217,10 +269,14 @@ def _valid(out: Any, slot: str, scene: Scene, n_matches: int | None = None) -> N
             assert ((p >= 0) & (p <= 1)).all(), f"{side} holds values outside [0, 1]"
     elif slot == "match":
         assert isinstance(out, Correspondences), f"returned {type(out).__name__}, not Correspondences"
-        assert (out.weight >= 0).all(), "weights must not be negative"
-        assert np.isfinite(out.source).all(), "a match is not finite"
-        if "group" in getattr(type(out), "gives", ()):
-            assert out.group is not None, "promises groups and gives none"
+        assert "group" not in promised or out.group is not None, "promises groups and gives none"
+        for side, level in (("source", scene.source), ("target", scene.target)):
+            found = getattr(out, side)
+            far = _AT_A_POINT * max(out.spacing or 0.0, level.spacing)
+            off = float(np.median(level.tree.query(found)[0])) if len(found) else 0.0
+            assert off < far, (
+                f"the matches' {side} lies {off:.2g} m off the {side}'s points; are the clouds swapped?"
+            )
     else:
         assert isinstance(out, Pose), f"returned {type(out).__name__}, not a Pose"
         se3.check(np.asarray(out.T, dtype=np.float64))
@@ -228,7 +284,7 @@ def _valid(out: Any, slot: str, scene: Scene, n_matches: int | None = None) -> N
 
 def _same(a: Any, b: Any) -> None:
     for x, y in zip(_arrays(a), _arrays(b), strict=True):
-        assert np.array_equal(x, y), "two equal runs differ"
+        assert np.array_equal(x, y, equal_nan=True), "two equal runs differ"
 
 
 def _arrays(out: Any) -> list[Array]:
