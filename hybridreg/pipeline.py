@@ -7,7 +7,7 @@ import os
 import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -129,9 +129,17 @@ class Pipeline(Stage):
             stages["downsample"] = "voxel"
         return type(self)(**{**own_params(self), **stages})
 
-    def __call__(self, source: Any, target: Any, image: Any = None, *, seed: int = 0) -> RegistrationResult:
-        """Align two clouds; takes anything that `PointCloud.of` does."""
-        return self.run(Pair.of(source, target, image), seed=seed)
+    def __call__(
+        self,
+        source: Any,
+        target: Any,
+        image: Any = None,
+        *,
+        seed: int = 0,
+        nonfinite: Literal["raise", "drop"] = "raise",
+    ) -> RegistrationResult:
+        """Align two clouds; takes anything that `PointCloud.of` does, and `nonfinite` as it does."""
+        return self.run(Pair.of(source, target, image, nonfinite=nonfinite), seed=seed)
 
     def run(self, pair: Pair, *, seed: int = 0, matches: Any = None) -> RegistrationResult:
         """Align a pair.
