@@ -9,7 +9,7 @@ from typing import Any, Literal
 
 from hybridreg.cloud import PointCloud
 from hybridreg.many.alignment import Alignment
-from hybridreg.many.link_search import Rows, aligned
+from hybridreg.many.link_search import Rows, aligned, is_row
 from hybridreg.pipeline import Pipeline
 from hybridreg.presets import DEFAULT
 
@@ -62,8 +62,10 @@ def register_all(
             f"voxel={voxel} is a preset's; give the pipeline its own: pipeline.swap(voxel={voxel})"
         )
     told = _names(clouds, names)
-    if not 0 <= reference < len(clouds):
-        raise ValueError(f"reference={reference} must be a row of the {len(clouds)} clouds")
+    if not is_row(reference, len(clouds)):
+        raise ValueError(
+            f"reference={reference!r} must be a row of the {len(clouds)} clouds, 0 to {len(clouds) - 1}"
+        )
     held = [
         PointCloud.of(cloud, name=name, nonfinite=nonfinite) for cloud, name in zip(clouds, told, strict=True)
     ]
