@@ -4,7 +4,10 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, ClassVar
+
+from hybridreg.config.typed_fields import typed
 
 if TYPE_CHECKING:
     from typing_extensions import Self
@@ -19,6 +22,19 @@ class Stage:
     needs: ClassVar[frozenset[str]] = frozenset()
     gives: ClassVar[frozenset[str]] = frozenset()
 
+    def __post_init__(self) -> None:
+        """Check the fields by their annotations; a subclass that checks more calls this first.
+
+        Raises
+        ------
+        ValueError
+            Naming the field and its value.
+        """
+        given = own_params(self)
+        for name, value in typed(type(self), given, type(self).__name__).items():
+            if value is not given[name]:  # a list as a tuple, a number of numpy as Python's
+                object.__setattr__(self, name, value)
+
     def get_params(self, deep: bool = True) -> dict[str, Any]:
         """Fields by name; with `deep`, also those of nested stages as `field__name`."""
         params = own_params(self)
@@ -30,13 +46,24 @@ class Stage:
 
     def replace(self, **changes: Any) -> Self:
         """A copy with some fields changed; `field__name` reaches into a nested stage."""
-        plain = {k: v for k, v in changes.items() if "__" not in k}
-        for key, value in changes.items():
-            outer, _, inner = key.partition("__")
-            if inner:
-                nested = plain.get(outer, getattr(self, outer))
-                plain[outer] = dataclasses.replace(nested, **{inner: value})
-        return dataclasses.replace(self, **plain)  # type: ignore[type-var]
+        return dataclasses.replace(self, **own_changes(self, changes))  # type: ignore[type-var]
+
+
+def own_changes(stage: Any, changes: Mapping[str, Any]) -> dict[str, Any]:
+    """Changes by `field` and `field__name` as changes of the stage's own fields, nested stages built."""
+    own = {key: value for key, value in changes.items() if "__" not in key}
+    for key, value in changes.items():
+        outer, _, inner = key.partition("__")
+        if inner:
+            nested = own.get(outer, getattr(stage, outer))
+            if isinstance(nested, (str, Mapping)):
+                from hybridreg.spec import from_table
+
+                nested = from_table(nested, outer)
+            if not dataclasses.is_dataclass(nested):
+                raise TypeError(f"{key}: {outer} is {nested!r}, which has no fields")
+            own[outer] = dataclasses.replace(nested, **{inner: value})  # type: ignore[type-var]
+    return own
 
 
 def own_params(stage: Any) -> dict[str, Any]:

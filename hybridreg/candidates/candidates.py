@@ -75,10 +75,12 @@ class Candidates(Stage):
     enough: float = OK
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         if isinstance(self.refine, (str, Mapping)):
             object.__setattr__(self, "refine", spec.from_table(self.refine, "refine"))
         if any(isinstance(stage, (str, Mapping)) for entry in self.of for stage in entry.values()):
             object.__setattr__(self, "of", tuple(_built(entry) for entry in self.of))
+        fitting.check_stage("refine", self.refine)
         if not self.of:
             raise ValueError("of: no entry at all; give one at least, such as {'estimate': 'birdseye'}")
         for entry in self.of:
@@ -248,6 +250,8 @@ def _check(entry: Entry) -> None:
             f"of: an entry holds {', '.join(entry) or 'nothing'}; it needs `estimate`, and may have `match` and, "
             "with that, `overlap`"
         )
+    for slot, stage in entry.items():
+        fitting.check_stage(f"of: {slot}", stage)
     if "match" in entry:
         fitting.check_match(entry["match"], entry["estimate"])
 
