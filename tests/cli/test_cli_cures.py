@@ -57,7 +57,7 @@ def test_every_phrase_is_one_that_the_library_says() -> None:
 
 
 def test_every_option_exists() -> None:
-    known = "".join(call(name, "--help").output for name in ("register", "together"))
+    known = "".join(call(name, "--help").output for name in ("register", "together", "train"))
     for means in (*(each for _, several in CURES for each in several), *(named for _, named in VALUES)):
         for option in options_in(means):
             assert option in re.sub(r"\x1b\[[0-9;]*m", "", known), option

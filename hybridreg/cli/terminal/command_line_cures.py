@@ -25,6 +25,7 @@ CURES = (
         ("insist with --set SLOT.untrained=true", "insist with untrained = true"),
     ),
     (r"use device='cpu'", ("use --set SLOT.device=cpu", 'use device = "cpu"')),
+    (r"use accelerator='cpu'", ("use --accelerator cpu",)),
     (
         r"say so: a viewpoint lets",
         ("say so (--source-viewpoint, --target-viewpoint): a viewpoint lets",),
@@ -38,6 +39,7 @@ VALUES = (
     (r"\bmax_rotation=", "--max-rotation "),
     (r"\bvoxel=(\S+) was given", r"--voxel \1 was given"),
     (r"\bvoxel=(\S+) contradicts", r"--voxel \1 contradicts"),
+    (r"\baccelerator='(\w+)': ", r"--accelerator \1: "),
     (r"\bpreset='(.*)' and pipeline='(.*)': ", r"--preset \1 and --pipeline \2: "),
 )
 
