@@ -27,7 +27,7 @@ from hybridreg.runtime.resources import Clock, peak_memory_mb, reset_peak_memory
 from hybridreg.runtime.threads import one_blas
 from hybridreg.scene import Scene
 from hybridreg.slots import SLOTS, checked
-from hybridreg.stage import Stage, own_changes
+from hybridreg.stage import Stage, own_changes, same
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,6 +84,11 @@ class Pipeline(Stage):
         fitting.check(self)
         if self.prior is not None:
             object.__setattr__(self, "prior", Prior.of(self.prior))
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Pipeline):
+            return NotImplemented
+        return all(same(getattr(self, name), getattr(other, name)) for name in (*SLOTS, "prior"))
 
     @classmethod
     def preset(cls, name: str, *, voxel: float | None = None) -> Pipeline:

@@ -5,7 +5,9 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar, NoReturn
+
+import numpy as np
 
 from hybridreg.config.typed_fields import typed
 
@@ -16,7 +18,8 @@ if TYPE_CHECKING:
 class Stage:
     """Mix-in of a frozen keyword-only dataclass with `__call__`.
 
-    `get_params` makes `sklearn.base.clone` work. Third-party stages need not inherit from it.
+    `get_params` makes `sklearn.base.clone` work; `set_params` tells what to do instead. Third-party stages need not
+    inherit from it.
     """
 
     needs: ClassVar[frozenset[str]] = frozenset()
@@ -34,6 +37,19 @@ class Stage:
         for name, value in typed(type(self), given, type(self).__name__).items():
             if value is not given[name]:  # a list as a tuple, a number of numpy as Python's
                 object.__setattr__(self, name, value)
+
+    def set_params(self, **changes: Any) -> NoReturn:
+        """Refused, as scikit-learn's way to change an estimator in place: a stage is frozen; `replace` gives a copy.
+
+        Raises
+        ------
+        AttributeError
+            Always, with the call of `replace` that means the same.
+        """
+        told = ", ".join(f"{name}={value!r}" for name, value in changes.items())
+        raise dataclasses.FrozenInstanceError(
+            f"{type(self).__name__} is frozen, set_params cannot change it; take the copy that replace({told}) gives"
+        )
 
     def get_params(self, deep: bool = True) -> dict[str, Any]:
         """Fields by name; with `deep`, also those of nested stages as `field__name`."""
@@ -64,6 +80,24 @@ def own_changes(stage: Any, changes: Mapping[str, Any]) -> dict[str, Any]:
                 raise TypeError(f"{key}: {outer} is {nested!r}, which has no fields")
             own[outer] = dataclasses.replace(nested, **{inner: value})  # type: ignore[type-var]
     return own
+
+
+def same(one: Any, other: Any) -> bool:
+    """Whether two stages, or two values of fields, are equal; arrays are where all their items are."""
+    try:
+        return one is other or bool(one == other)
+    except ValueError:  # an array somewhere inside, which numpy does not reduce to one truth
+        pass
+    if isinstance(one, np.ndarray) or isinstance(other, np.ndarray):
+        return np.array_equal(one, other)
+    if type(one) is not type(other):
+        return False
+    if dataclasses.is_dataclass(one):
+        names = [f.name for f in dataclasses.fields(one) if f.compare]
+        return all(same(getattr(one, name), getattr(other, name)) for name in names)
+    if isinstance(one, Mapping):
+        return one.keys() == other.keys() and all(same(one[key], other[key]) for key in one)
+    return len(one) == len(other) and all(map(same, one, other))
 
 
 def own_params(stage: Any) -> dict[str, Any]:

@@ -187,6 +187,36 @@ def test_a_voxel_can_be_changed_in_every_way(pipe: hr.Pipeline) -> None:
     assert hr.Pipeline(downsample="random").swap(voxel=None).downsample == hr.RandomSample()
 
 
+def test_pipelines_have_a_hash_and_are_compared_whatever_their_stages_hold() -> None:
+    crop = (-10.0, -10.0, -10.0, 10.0, 10.0, 10.0)
+    pipe = hr.Pipeline.preset("default", voxel=0.5).swap(prior={"crop": crop})
+    again = hr.Pipeline(**pipe.to_spec())
+    assert len({pipe, again}) == 1
+    assert pipe != pipe.swap(voxel=0.4)
+    assert pipe != "default"
+
+    @dataclass(frozen=True)
+    class Table:
+        rows: np.ndarray
+
+        def __call__(self, scene: Scene, matches: Correspondences, rng: np.random.Generator) -> Pose:
+            return Pose(np.eye(4))
+
+    one, same, other = (hr.Pipeline(estimate=Table(np.array(rows))) for rows in ([1, 2], [1, 2], [1, 3]))
+    assert one == same
+    assert one != other
+    entries = [hr.Candidates(of=({"estimate": each.estimate},)) for each in (one, same, other)]
+    assert hr.Pipeline(estimate=entries[0]) == hr.Pipeline(estimate=entries[1])
+    assert hr.Pipeline(estimate=entries[0]) != hr.Pipeline(estimate=entries[2])
+
+
+def test_what_is_frozen_names_replace() -> None:
+    with pytest.raises(AttributeError, match=r"Ransac is frozen, .* replace\(iterations=5\)"):
+        hr.Ransac().set_params(iterations=5)
+    with pytest.raises(AttributeError, match=r"Pipeline is frozen, .* replace\(refine__iterations=5\)"):
+        hr.Pipeline().set_params(refine__iterations=5)
+
+
 def test_a_field_of_a_stage_that_is_named_in_the_same_breath() -> None:
     assert hr.Pipeline().replace(match="fpfh", match__radius=2.0).match == hr.Fpfh(radius=2.0)
     candidates = hr.Candidates().replace(refine={"stage": "icp"}, refine__iterations=2)

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, fields, is_dataclass, replace
+from dataclasses import dataclass, field, fields, is_dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -70,7 +70,8 @@ class Candidates(Stage):
         Confidence at which the search stops (the verdict's "ok"); 1 tries every entry.
     """
 
-    of: tuple[Entry, ...] = ({"estimate": "birdseye"}, {"estimate": "kiss"})
+    # Mappings have no hash; equal stages still have equal ones.
+    of: tuple[Entry, ...] = field(default=({"estimate": "birdseye"}, {"estimate": "kiss"}), hash=False)
     refine: Any = "gicp"
     enough: float = OK
 
