@@ -66,20 +66,23 @@ class Stage:
 
 
 def own_changes(stage: Any, changes: Mapping[str, Any]) -> dict[str, Any]:
-    """Changes by `field` and `field__name` as changes of the stage's own fields, nested stages built."""
+    """Changes by `field` and `field__name` as changes of the stage's own fields."""
     own = {key: value for key, value in changes.items() if "__" not in key}
     for key, value in changes.items():
         outer, _, inner = key.partition("__")
         if inner:
-            nested = own.get(outer, getattr(stage, outer))
-            if isinstance(nested, (str, Mapping)):
-                from hybridreg.spec import from_table
-
-                nested = from_table(nested, outer)
-            if not dataclasses.is_dataclass(nested):
-                raise TypeError(f"{key}: {outer} is {nested!r}, which has no fields")
-            own[outer] = dataclasses.replace(nested, **{inner: value})  # type: ignore[type-var]
+            own[outer] = _with(own.get(outer, getattr(stage, outer)), inner, value, key)
     return own
+
+
+def _with(nested: Any, field: str, value: Any, key: str) -> Any:
+    if isinstance(nested, str):
+        nested = {"stage": nested}
+    if isinstance(nested, Mapping):  # built with all its fields at once: some need others
+        return {**nested, field: value}
+    if not dataclasses.is_dataclass(nested):
+        raise TypeError(f"{key}: {nested!r} has no fields")
+    return dataclasses.replace(nested, **{field: value})  # type: ignore[type-var]
 
 
 def same(one: Any, other: Any) -> bool:

@@ -22,7 +22,7 @@ def typed(cls: type[Any], values: Mapping[str, Any], where: str) -> dict[str, An
     ValueError
         A value of another kind; the message begins with ``where`` and the field.
     """
-    hints, defaults = _hints(cls), {f.name: f.default for f in dataclasses.fields(cls)}
+    hints, defaults = _hints(cls), {f.name: f.default for f in dataclasses.fields(cls)}  # type: ignore[arg-type]
     return {
         key: value_of(hints[key], value, f"{where}: {key}")
         if key in hints and value is not defaults.get(key)

@@ -6,7 +6,6 @@ from __future__ import annotations
 import time
 from collections.abc import Iterable, Mapping, MutableMapping, Sequence
 from dataclasses import replace
-from numbers import Integral
 from typing import Any
 
 import numpy as np
@@ -114,7 +113,7 @@ def _key(a: int, b: int, poses: Array | None) -> Key:
 
 def is_row(value: Any, n: int) -> bool:
     """Whether it counts one of `n` clouds, from 0."""
-    return isinstance(value, Integral) and not isinstance(value, bool) and 0 <= value < n
+    return isinstance(value, (int, np.integer)) and not isinstance(value, bool) and 0 <= int(value) < n
 
 
 def _given(rows: Rows, T: Any, n: int) -> Link:
