@@ -48,6 +48,7 @@ class Fgr(Stage):
     needs: ClassVar[frozenset[str]] = frozenset({"matches"})
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         if self.max_distance is not None and not self.max_distance > 0.0:
             raise ValueError(f"max_distance={self.max_distance} must be a positive length in metres")
         if not self.division_factor > 1.0:

@@ -69,6 +69,7 @@ class Fpfh(Stage):
     gives: ClassVar[frozenset[str]] = frozenset({"matches", "group"})
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         if self.radius is not None and not self.radius > 0.0:
             raise ValueError(f"radius={self.radius} must be a positive length in metres")
         if self.cell is not None and not self.cell > 0.0:

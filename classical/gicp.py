@@ -56,6 +56,7 @@ class Gicp(Stage):
     iterations: int = 30
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         limits.positive(self, "voxel", "fineness", "max_distances")
         limits.at_least(self, _FEWEST_NEIGHBOURS, "neighbours")
         limits.at_least(self, 1, "iterations")

@@ -43,8 +43,7 @@ class Icp(Stage):
     iterations: int = 50
 
     def __post_init__(self) -> None:
-        if self.kind not in ("point", "plane"):
-            raise ValueError(f"kind={self.kind!r} must be 'point' or 'plane'")
+        super().__post_init__()
         limits.positive(self, "max_distances")
         limits.at_least(self, 1, "iterations")
 

@@ -59,6 +59,7 @@ class KissMatcher(Stage):
     max_matches: int = 5000
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         for name in ("voxel", "scale"):
             value = getattr(self, name)
             if value is not None and not 0.0 < value < np.inf:

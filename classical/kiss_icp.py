@@ -49,6 +49,7 @@ class KissIcp(Stage):
     iterations: int = 500
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         limits.positive(self, "sigma", "voxel")
         limits.at_least(self, 1, "iterations")
 

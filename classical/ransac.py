@@ -67,6 +67,7 @@ class Ransac(Stage):
     needs: ClassVar[frozenset[str]] = frozenset({"matches"})
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         if self.iterations < 1:
             raise ValueError(f"iterations={self.iterations} must be at least 1")
         if self.sample_size < 3:
@@ -80,8 +81,6 @@ class Ransac(Stage):
         for name in ("edge_ratio", "confidence", "rival_share"):
             if not 0.0 <= getattr(self, name) <= 1.0:
                 raise ValueError(f"{name}={getattr(self, name)} must lie in [0, 1]")
-        if self.backend not in ("own", "open3d"):
-            raise ValueError(f"backend={self.backend!r} must be 'own' or 'open3d'")
 
     def __call__(self, scene: Scene, matches: Correspondences, rng: np.random.Generator) -> Pose:
         rows = self._rows(scene, matches, rng)

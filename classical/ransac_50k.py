@@ -48,6 +48,7 @@ class Ransac50k(Stage):
     needs: ClassVar[frozenset[str]] = frozenset({"matches"})
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         if not self.max_distance > 0.0:
             raise ValueError(f"max_distance={self.max_distance} must be a positive length in metres")
         if self.iterations < 1:

@@ -37,6 +37,7 @@ class RandomSample(Stage):
     seed: int = 0
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         limits.at_least(self, MIN_POINTS, "n_points")
         limits.at_least(self, 0, "seed")
 

@@ -34,6 +34,7 @@ class WeightedSvd(Stage):
     needs: ClassVar[frozenset[str]] = frozenset({"matches"})
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         if self.max_distance is not None and not self.max_distance > 0.0:
             raise ValueError(f"max_distance={self.max_distance} must be a positive length in metres")
 

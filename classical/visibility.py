@@ -46,6 +46,7 @@ class Visibility(Stage):
     baseline: float | None = None
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         if self.baseline is not None and not 0.0 <= self.baseline < np.inf:
             raise ValueError(f"baseline={self.baseline} must be a length in metres, zero or more")
 

@@ -48,10 +48,9 @@ class VoxelGrid(Stage):
     density: Literal["keep", "match"] = "keep"
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         if self.voxel is not None and not 0.0 < self.voxel < np.inf:
             raise ValueError(f"voxel={self.voxel} must be a positive length in metres")
-        if self.density not in ("keep", "match"):
-            raise ValueError(f"density={self.density!r} must be 'keep' or 'match'")
 
     def __call__(self, pair: Pair) -> Scene:
         thin = thinned(pair, self.voxel)

@@ -66,7 +66,9 @@ class Table:
         n = sum(row.T_true is None for row in rows)
         if not n:
             return []
-        return [f"{n} of {number_of(len(rows), 'pair')} could not be read: against the recall, in no other number"]
+        return [
+            f"{n} of {number_of(len(rows), 'pair')} could not be read: against the recall, in no other number"
+        ]
 
     def failure(self) -> str:
         """Why every row of every method failed, by the first; empty where one did not."""

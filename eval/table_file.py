@@ -115,14 +115,7 @@ def parse(table: Mapping[str, Any], *, title: str = "table") -> Recipe:
     lines = [*_rows(content.base, content.row), *_grid(content.base, content.sweep)]
     if not lines:
         raise ValueError("the table has no [[row]] and no [sweep]")
-    names = [slug(line.name) for line in lines]
-    double = next((line.name for line in lines if names.count(slug(line.name)) > 1), None)
-    if double is not None:
-        raise ValueError(f"two rows are called {double!r}; give each its own name")
-    if slug(IDENTITY) in names:
-        raise ValueError(
-            f"a row is called {IDENTITY!r}, as the first one of every table is; give it another name"
-        )
+    _check_names([line.name for line in lines])
     return Recipe(
         title=content.title or title,
         data=content.data,
@@ -150,6 +143,25 @@ def title_of(changed: Mapping[str, Any]) -> str:
             text = str(value)
         parts.append(text if key == "preset" else f"{key} {text}")
     return ", ".join(parts) or "base"
+
+
+def _check_names(names: Sequence[str]) -> None:
+    first: dict[str, str] = {}
+    for name in names:
+        file = slug(name)
+        if file == slug(IDENTITY):
+            raise ValueError(
+                f"a row is called {name!r}, as the first one of every table is; give it another name"
+            )
+        other = first.get(file)
+        if other == name:
+            raise ValueError(f"two rows are called {name!r}; give each its own name")
+        if other is not None:
+            raise ValueError(
+                f"the rows {other!r} and {name!r} would both be stored in {file}.jsonl; give one another name, which "
+                "differs in letters from a to z or in digits"
+            )
+        first[file] = name
 
 
 def _shipped() -> Any:

@@ -37,9 +37,8 @@ def build(changes: Mapping[str, Any]) -> Pipeline:
     if unknown:
         raise ValueError(f"{', '.join(sorted(unknown))}: unknown; a pipeline is given by {', '.join(KEYS)}")
     if "preset" in changes and "pipeline" in changes:
-        raise ValueError(
-            f"preset={changes['preset']!r} and pipeline={changes['pipeline']!r}: leave one of them out"
-        )
+        preset, path = changes["preset"], str(changes["pipeline"])
+        raise ValueError(f"preset={preset!r} and pipeline={path!r}: leave one of them out")
     if "pipeline" in changes:
         if not isinstance(changes["pipeline"], (str, os.PathLike)):
             raise ValueError(f"pipeline={changes['pipeline']!r} must be the path of a TOML file")

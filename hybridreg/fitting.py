@@ -38,15 +38,32 @@ def with_voxel(downsample: Any, voxel: float | None) -> Any:
         return downsample
     if isinstance(voxel, bool) or not isinstance(voxel, Real):
         raise ValueError(f"voxel={voxel!r} must be a positive length in metres")
-    if not hasattr(downsample, "voxel"):
+    if not _takes_voxel(downsample):
         raise ValueError(
             f"voxel={voxel} was given, but {type(downsample).__name__} has no voxel; leave one of them out"
         )
     if downsample.voxel == voxel:
         return downsample
     if downsample.voxel is not None:
-        raise ValueError(f"voxel={voxel} contradicts the downsampling stage's own voxel={downsample.voxel}")
+        raise ValueError(
+            f"voxel={voxel} contradicts the downsampling stage's own voxel={downsample.voxel}; leave one of them out"
+        )
     return dataclasses.replace(downsample, voxel=voxel)
+
+
+def without_voxel(downsample: Any) -> Any:
+    """The downsampling stage with a voxel that it derives; as it is where it has none of its own."""
+    own = _takes_voxel(downsample) and downsample.voxel is not None
+    return dataclasses.replace(downsample, voxel=None) if own else downsample
+
+
+def ready_for_voxel(downsample: Any, voxel: float | None) -> Any:
+    """The downsampling stage to which a pipeline's voxel is given anew: a grid, if this one takes none."""
+    return without_voxel(downsample) if voxel is None or _takes_voxel(downsample) else "voxel"
+
+
+def _takes_voxel(downsample: Any) -> bool:
+    return dataclasses.is_dataclass(downsample) and hasattr(downsample, "voxel")
 
 
 def following(before: Any, after: Any, estimate: Any) -> Any:
@@ -72,8 +89,7 @@ def check(pipeline: Pipeline) -> None:
         Naming the slot, what is missing, and stages that would fit.
     """
     for slot in SLOTS:
-        if not callable(getattr(pipeline, slot)):
-            raise ValueError(f"{slot}: {getattr(pipeline, slot)!r} is not a stage; it must be callable")
+        check_stage(slot, getattr(pipeline, slot))
     check_match(pipeline.match, pipeline.estimate)
     masks = registry.name_of(pipeline.overlap) not in (None, "overlap.none")
     if masks and registry.name_of(pipeline.match) == "match.none":
@@ -81,6 +97,12 @@ def check(pipeline: Pipeline) -> None:
             f"overlap: nothing looks at the mask of {_label(pipeline.overlap)} where match is 'none'; leave overlap at "
             "'none', or choose a matcher"
         )
+
+
+def check_stage(where: str, stage: Any) -> None:
+    """Refuse what cannot be called."""
+    if not callable(stage):
+        raise ValueError(f"{where}: {stage!r} is not a stage; it must be callable")
 
 
 def check_match(match: Any, estimate: Any) -> None:

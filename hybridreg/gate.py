@@ -19,6 +19,8 @@ MIN_POINTS = 20
 _LARGEST = 1.5e11
 # A cloud thinner than a millionth of its length in two directions fixes no rotation about that length.
 _THINNEST = 1e-6
+# The cure that only a caller has whose function takes the argument.
+OR_DROP = ' or pass nonfinite="drop"'
 _LOT = 2**18  # points
 _FILLED = 0.01  # share of points exactly at the origin from which they count as missing returns
 _COARSE = 0.01  # metres between coordinates from which their rounding is reported
@@ -54,7 +56,7 @@ def finite(points: Array, name: str, *, drop: bool) -> tuple[Array, NDArray[np.b
     if not drop:
         raise ValueError(
             f"{name}: {n_bad} of {len(points)} points are not finite (the first is row {int(np.argmin(good))}); "
-            'remove them or pass nonfinite="drop"'
+            f"remove them{OR_DROP}"
         )
     return points[good], good
 
@@ -74,7 +76,7 @@ def returned(
     if not drop:
         warnings.warn(
             f"{name}: {n_bad} of {len(points)} points lie exactly at (0, 0, 0), which drivers write for missing "
-            'returns; remove them or pass nonfinite="drop"',
+            f"returns; remove them{OR_DROP}",
             UserWarning,
             stacklevel=4,
         )

@@ -7,7 +7,7 @@ import os
 import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,7 +27,7 @@ from hybridreg.runtime.resources import Clock, peak_memory_mb, reset_peak_memory
 from hybridreg.runtime.threads import one_blas
 from hybridreg.scene import Scene
 from hybridreg.slots import SLOTS, checked
-from hybridreg.stage import Stage, own_params
+from hybridreg.stage import Stage, own_changes, same
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,16 +69,26 @@ class Pipeline(Stage):
     estimate: Any = "ransac"
     refine: Any = "gicp"
     prior: Any = None
+    _given_downsample: ClassVar[Any]
 
     def __post_init__(self) -> None:
         for slot in SLOTS:
             given = getattr(self, slot)
             if isinstance(given, (str, Mapping)):
                 object.__setattr__(self, slot, spec.from_table(given, slot))
-        object.__setattr__(self, "downsample", fitting.with_voxel(self.downsample, self.voxel))
+        downsample = fitting.with_voxel(self.downsample, self.voxel)
+        # For `get_params`: beside a voxel the stage has none of its own, so that the voxel alone can be changed.
+        given = self.downsample if self.voxel is None else fitting.without_voxel(self.downsample)
+        object.__setattr__(self, "_given_downsample", given)
+        object.__setattr__(self, "downsample", downsample)
         fitting.check(self)
         if self.prior is not None:
             object.__setattr__(self, "prior", Prior.of(self.prior))
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Pipeline):
+            return NotImplemented
+        return all(same(getattr(self, name), getattr(other, name)) for name in (*SLOTS, "prior"))
 
     @classmethod
     def preset(cls, name: str, *, voxel: float | None = None) -> Pipeline:
@@ -131,13 +141,29 @@ class Pipeline(Stage):
             stages["estimate"] = fitting.following(self.match, stages["match"], self.estimate)
         if "downsample" in stages:
             stages.setdefault("voxel", None)
-        elif stages.get("voxel") is not None:
-            stages["downsample"] = "voxel"
-        return type(self)(**{**own_params(self), **stages})
+        elif "voxel" in stages:
+            stages["downsample"] = fitting.ready_for_voxel(self.downsample, stages["voxel"])
+        return type(self)(**{**self.get_params(deep=False), **stages})
 
-    def __call__(self, source: Any, target: Any, image: Any = None, *, seed: int = 0) -> RegistrationResult:
-        """Align two clouds; takes anything that `PointCloud.of` does."""
-        return self.run(Pair.of(source, target, image), seed=seed)
+    def replace(self, **changes: Any) -> Pipeline:
+        """As `swap`; `slot__field` reaches into a stage: `pipe.replace(match="fpfh", match__radius=2.5)`."""
+        return self.swap(**own_changes(self, changes))
+
+    def get_params(self, deep: bool = True) -> dict[str, Any]:
+        """Slots by name, as a new pipeline takes them; with `deep`, also the stages' fields as `slot__field`."""
+        return {**super().get_params(deep), "downsample": self._given_downsample}
+
+    def __call__(
+        self,
+        source: Any,
+        target: Any,
+        image: Any = None,
+        *,
+        seed: int = 0,
+        nonfinite: Literal["raise", "drop"] = "raise",
+    ) -> RegistrationResult:
+        """Align two clouds; takes anything that `PointCloud.of` does, and `nonfinite` as it does."""
+        return self.run(Pair.of(source, target, image, nonfinite=nonfinite), seed=seed)
 
     def run(self, pair: Pair, *, seed: int = 0, matches: Any = None) -> RegistrationResult:
         """Align a pair.

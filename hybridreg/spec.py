@@ -10,14 +10,13 @@ a slot's name holds a stage of that slot, and a table of slots one stage for eac
 from __future__ import annotations
 
 import dataclasses
-import typing
 from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
 
 from hybridreg import registry
-from hybridreg.config import plain_values
+from hybridreg.config.typed_fields import typed
 from hybridreg.slots import SLOTS
 from hybridreg.stage import own_params
 
@@ -94,17 +93,7 @@ def from_table(table: Any, slot: str | None = None) -> Any:
 
 
 def _typed(cls: type[Any], fields: dict[str, Any], where: str) -> dict[str, Any]:
-    # A dataclass in Python trusts its caller; a file's author has no type checker.
-    if not dataclasses.is_dataclass(cls):
-        return fields
-    try:
-        hints = typing.get_type_hints(cls)
-    except NameError:  # third-party annotations, of names that only a type checker imports
-        return fields
-    return {
-        key: plain_values.value_of(hints[key], value, f"{where}: {key}") if key in hints else value
-        for key, value in fields.items()
-    }
+    return typed(cls, fields, where) if dataclasses.is_dataclass(cls) else fields
 
 
 def _resolve(name: str, slot: str | None) -> tuple[str, str]:

@@ -15,6 +15,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import array_shapes, arrays
 
+import hybridreg as hr
+import hybridreg.testing
 from hybridreg import PointCloud
 
 GOOD = np.random.default_rng(0).uniform(-10, 10, (50, 3))
@@ -62,6 +64,18 @@ def test_drops_nonfinite_points_only_when_asked(value: float) -> None:
     cloud = PointCloud.of(with_row(value), nonfinite="drop")
     assert len(cloud) == 49
     assert cloud.dropped == 1
+
+
+def test_every_entrance_takes_the_cure_that_it_names() -> None:
+    holed = hr.testing.sample_pair()[0].target.points.copy()
+    holed[5] = np.nan
+    pipe = hr.Pipeline(match="none", estimate="identity", refine="none", voxel=0.5)
+    with pytest.raises(ValueError, match='nonfinite="drop"'):
+        pipe(holed, holed)
+    assert any("missing" in note for note in pipe(holed, holed, nonfinite="drop").notes)
+    with pytest.raises(ValueError, match='nonfinite="drop"'):
+        hr.register_all([holed, holed], pipeline=pipe)
+    assert len(hr.register_all([holed, holed], pipeline=pipe, nonfinite="drop").poses) == 2
 
 
 def test_dropping_everything_is_an_empty_cloud() -> None:

@@ -164,6 +164,68 @@ def test_swap_changes_one_slot_and_only_that() -> None:
         pipe.swap(estimator="svd")
 
 
+@pytest.mark.parametrize(
+    "pipe",
+    [
+        hr.Pipeline(voxel=0.5, downsample=hr.VoxelGrid(density="match")),
+        hr.Pipeline(downsample=hr.VoxelGrid(voxel=0.5, density="match")),
+    ],
+)
+def test_a_voxel_can_be_changed_in_every_way(pipe: hr.Pipeline) -> None:
+    wanted = hr.VoxelGrid(voxel=0.3, density="match")
+    assert pipe.swap(voxel=0.3).downsample == wanted
+    assert pipe.replace(voxel=0.3).downsample == wanted
+    assert pipe.replace(downsample__voxel=0.3).downsample == wanted
+    assert pipe.replace(voxel=0.3).replace(voxel=0.2).swap(voxel=0.3).swap(refine="none").downsample == wanted
+    assert pipe.swap(voxel=None).downsample == hr.VoxelGrid(density="match")
+    assert pipe.replace(refine__iterations=3).downsample.voxel == 0.5
+    if pipe.voxel is not None:
+        params = pipe.get_params(deep=False)
+        assert hr.Pipeline(**params) == pipe
+        assert hr.Pipeline(**{**params, "voxel": 0.3}).downsample == wanted
+    assert hr.Pipeline(downsample="random").swap(voxel=0.3).downsample == hr.VoxelGrid(voxel=0.3)
+    assert hr.Pipeline(downsample="random").swap(voxel=None).downsample == hr.RandomSample()
+
+
+def test_pipelines_have_a_hash_and_are_compared_whatever_their_stages_hold() -> None:
+    crop = (-10.0, -10.0, -10.0, 10.0, 10.0, 10.0)
+    pipe = hr.Pipeline.preset("default", voxel=0.5).swap(prior={"crop": crop})
+    again = hr.Pipeline(**pipe.to_spec())
+    assert len({pipe, again}) == 1
+    assert pipe != pipe.swap(voxel=0.4)
+    assert pipe != "default"
+
+    @dataclass(frozen=True)
+    class Table:
+        rows: np.ndarray
+
+        def __call__(self, scene: Scene, matches: Correspondences, rng: np.random.Generator) -> Pose:
+            return Pose(np.eye(4))
+
+    one, same, other = (hr.Pipeline(estimate=Table(np.array(rows))) for rows in ([1, 2], [1, 2], [1, 3]))
+    assert one == same
+    assert one != other
+    entries = [hr.Candidates(of=({"estimate": each.estimate},)) for each in (one, same, other)]
+    assert hr.Pipeline(estimate=entries[0]) == hr.Pipeline(estimate=entries[1])
+    assert hr.Pipeline(estimate=entries[0]) != hr.Pipeline(estimate=entries[2])
+
+
+def test_what_is_frozen_names_replace() -> None:
+    with pytest.raises(AttributeError, match=r"Ransac is frozen, .* replace\(iterations=5\)"):
+        hr.Ransac().set_params(iterations=5)
+    with pytest.raises(AttributeError, match=r"Pipeline is frozen, .* replace\(refine__iterations=5\)"):
+        hr.Pipeline().set_params(refine__iterations=5)
+
+
+def test_a_field_of_a_stage_that_is_named_in_the_same_breath() -> None:
+    assert hr.Pipeline().replace(match="fpfh", match__radius=2.0).match == hr.Fpfh(radius=2.0)
+    assert hr.Pipeline().replace(match="fcgf", match__size="nano", match__untrained=True).match.size == "nano"
+    candidates = hr.Candidates().replace(refine={"stage": "icp"}, refine__iterations=2)
+    assert candidates.refine == hr.Icp(iterations=2)
+    with pytest.raises(TypeError, match="estimate__tries: <function .* has no fields"):
+        hr.Pipeline().replace(estimate=lambda *_: None, estimate__tries=3)
+
+
 def test_mistyped_keyword_is_refused_at_once() -> None:
     with pytest.raises(TypeError, match="voxle"):
         hr.VoxelGrid(voxle=0.3)  # type: ignore[call-arg]

@@ -126,6 +126,10 @@ def test_the_work_may_be_spread_over_dask() -> None:
 @pytest.mark.parametrize("wrong, word", [
     ({"clouds": [np.zeros((30, 3))]}, "1 given, two or more"),
     ({"reference": 9}, "reference=9"),
+    ({"reference": True}, "reference=True must be a row of the 3 clouds, 0 to 2"),
+    ({"reference": "cloud 1"}, "reference='cloud 1' must be a row"),
+    ({"known": {(0, "b"): np.eye(4)}}, "no two rows"),
+    ({"workers": 0}, "workers=0 must be 1 or more processes"),
     ({"names": ["a", "a", "b"]}, "each needs one of its own"),
     ({"names": ["a"]}, "names: 1 given for 3"),
     ({"known": {(0, 3): np.eye(4)}}, r"known: \(0, 3\) are no two rows"),

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 from __future__ import annotations
 
+import dataclasses
 import subprocess
 import sys
 import zipfile
@@ -47,6 +48,15 @@ def test_every_built_in_stage_loads_and_knows_its_name(key: str) -> None:
     cls = registry.load(slot, name)
     random = {"untrained": True} if issubclass(cls, NetworkStage) else {}
     assert registry.name_of(cls(**random)) == key
+
+
+@pytest.mark.parametrize("key", sorted(registry.BUILT_IN))
+def test_every_field_of_a_built_in_stage_is_checked(key: str) -> None:
+    slot, _, name = key.partition(".")
+    cls = registry.load(slot, name)
+    for field in dataclasses.fields(cls):
+        with pytest.raises(ValueError, match=rf"\b{field.name}\b"):
+            cls(**{field.name: object()})
 
 
 def test_unknown_slot_and_name() -> None:

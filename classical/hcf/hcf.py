@@ -79,6 +79,7 @@ class Hcf(Stage):
     needs: ClassVar[frozenset[str]] = frozenset({"matches"})
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         limits.positive(self, "max_distance", "reach", "nms_radius", "refine_distance")
         limits.at_least(self, 1, "iterations")
         limits.at_least(self, 3, "set_size", "final_size", "max_matches")

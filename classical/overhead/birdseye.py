@@ -88,8 +88,7 @@ class BirdsEye(Stage):
     again: bool = True
 
     def __post_init__(self) -> None:
-        if self.vertical not in ("ground", "sensor", "both"):
-            raise ValueError(f"vertical={self.vertical!r} must be 'ground', 'sensor' or 'both'")
+        super().__post_init__()
         if self.voxel is not None and not 0.0 < self.voxel < np.inf:
             raise ValueError(f"voxel={self.voxel} must be a positive length in metres")
         if len(self.layers) < 2 or not (np.diff(self.layers) > 0.0).all():

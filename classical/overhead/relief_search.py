@@ -44,6 +44,7 @@ class ReliefSearch(Stage):
     tries: int = 8
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         limits.positive(self, "farthest")
         limits.at_least(self, 1, "tries")
 

@@ -13,7 +13,7 @@ from hybridreg.data.yaw_starts import start_of
 from hybridreg.eval.run.row import Row
 from hybridreg.eval.score import bootstrap, errors
 from hybridreg.eval.score.errors import Errors, Step
-from hybridreg.eval.score.protocols import RECALL_AT, Protocol
+from hybridreg.eval.score.protocols import INLIER_RADII, RECALL_AT, Protocol
 
 Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -145,7 +145,9 @@ def inlier_ratios(rows: Sequence[Row], protocol: Protocol, *, filtered: bool = F
     stored = [ratio for ratio in told if ratio]
     lacking = next((ratio for ratio in stored if key not in ratio), None)
     if lacking is not None:
-        raise ValueError(f"inlier ratios are stored at {', '.join(lacking)} m, not at {key} m; predict again")
+        known = [f"{radius:g}" for radius in INLIER_RADII]
+        cure = "predict again" if key in known else f"give inlier_m one of {', '.join(known)}"
+        raise ValueError(f"inlier ratios are stored at {', '.join(lacking)} m, not at {key} m; {cure}")
     ratios = [
         (ratio or {}).get(key, 0.0) for ratio, row in zip(told, rows, strict=True) if row.T_true is not None
     ]

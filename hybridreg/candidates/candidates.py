@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, fields, is_dataclass, replace
+from dataclasses import dataclass, field, fields, is_dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -70,15 +70,18 @@ class Candidates(Stage):
         Confidence at which the search stops (the verdict's "ok"); 1 tries every entry.
     """
 
-    of: tuple[Entry, ...] = ({"estimate": "birdseye"}, {"estimate": "kiss"})
+    # Mappings have no hash; equal stages still have equal ones.
+    of: tuple[Entry, ...] = field(default=({"estimate": "birdseye"}, {"estimate": "kiss"}), hash=False)
     refine: Any = "gicp"
     enough: float = OK
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         if isinstance(self.refine, (str, Mapping)):
             object.__setattr__(self, "refine", spec.from_table(self.refine, "refine"))
         if any(isinstance(stage, (str, Mapping)) for entry in self.of for stage in entry.values()):
             object.__setattr__(self, "of", tuple(_built(entry) for entry in self.of))
+        fitting.check_stage("refine", self.refine)
         if not self.of:
             raise ValueError("of: no entry at all; give one at least, such as {'estimate': 'birdseye'}")
         for entry in self.of:
@@ -248,6 +251,8 @@ def _check(entry: Entry) -> None:
             f"of: an entry holds {', '.join(entry) or 'nothing'}; it needs `estimate`, and may have `match` and, "
             "with that, `overlap`"
         )
+    for slot, stage in entry.items():
+        fitting.check_stage(f"of: {slot}", stage)
     if "match" in entry:
         fitting.check_match(entry["match"], entry["estimate"])
 

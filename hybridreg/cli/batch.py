@@ -11,6 +11,7 @@ from typing import Annotated
 import typer
 
 from hybridreg.cli import options
+from hybridreg.cli.terminal.command_line_cures import spoken
 from hybridreg.cli.terminal.error_messages import plainly
 from hybridreg.cli.terminal.stop_signals import going_on
 from hybridreg.config.number_of import number_of
@@ -56,11 +57,12 @@ def command(
             nonfinite="drop" if drop else "raise",
             target_viewpoint=options.viewpoint(target_viewpoint, "--target-viewpoint"),
             on_row=lambda row: progress.advance(bar),
+            spoken=spoken,
         )
     counts = Counter(row["verdict"] for row in rows)
     for row in rows:
         if row["error"]:
-            print(f"{row['id']}: {row['error']}")
+            print(f"{row['id']}: {spoken(row['error'])}")
     print(
         f"{number_of(len(rows), 'pair')}: "
         + ", ".join(f"{counts[word]} {word}" for word in ("ok", "doubtful", "failed"))

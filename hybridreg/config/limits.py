@@ -4,7 +4,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from numbers import Real
 from typing import Any
 
 
@@ -18,9 +19,8 @@ def positive(stage: Any, *names: str) -> None:
     """
     for name in names:
         value = getattr(stage, name)
-        items = _items(value)
-        if value is not None and not (items and all(0.0 < item < math.inf for item in items)):
-            raise ValueError(f"{name}={value} must be positive and finite")
+        if value is not None and not (_items(value) and _all(value, lambda item: 0.0 < item < math.inf)):
+            raise ValueError(f"{name}={_shown(value)} must be positive and finite")
 
 
 def within(stage: Any, low: float, high: float, *names: str) -> None:
@@ -33,8 +33,8 @@ def within(stage: Any, low: float, high: float, *names: str) -> None:
     """
     for name in names:
         value = getattr(stage, name)
-        if not all(low <= item <= high for item in _items(value)):
-            raise ValueError(f"{name}={value} must lie in {low:g} to {high:g}")
+        if not _all(value, lambda item: low <= item <= high):
+            raise ValueError(f"{name}={_shown(value)} must lie in {low:g} to {high:g}")
 
 
 def at_least(stage: Any, low: int, *names: str) -> None:
@@ -47,8 +47,17 @@ def at_least(stage: Any, low: int, *names: str) -> None:
     """
     for name in names:
         value = getattr(stage, name)
-        if not value >= low:
-            raise ValueError(f"{name}={value} must be at least {low}")
+        if not _all(value, lambda item: item >= low):
+            raise ValueError(f"{name}={_shown(value)} must be at least {low}")
+
+
+def _all(value: Any, test: Callable[[Any], bool]) -> bool:
+    # What is no number lies in no bounds; a configuration made in Python has not been checked for that.
+    return all(isinstance(item, Real) and test(item) for item in _items(value))
+
+
+def _shown(value: Any) -> Any:
+    return repr(value) if isinstance(value, str) else value
 
 
 def _items(value: Any) -> Sequence[Any]:

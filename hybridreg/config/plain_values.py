@@ -7,7 +7,10 @@ import dataclasses
 import types
 import typing
 from collections.abc import Mapping
+from contextlib import suppress
 from typing import Any, Literal, TypeVar
+
+import numpy as np
 
 T = TypeVar("T")
 _WANTED = {bool: "true or false", int: "a number", float: "a number", str: "a text"}
@@ -34,7 +37,7 @@ def build(cls: type[T], values: Mapping[str, Any], where: str) -> T:
 
 
 def value_of(hint: Any, value: Any, where: str) -> Any:
-    """A value as an annotation wants it: lists become tuples, whole numbers floats.
+    """A value as an annotation wants it: lists become tuples, whole numbers floats, numpy's numbers Python's.
 
     Values that an annotation does not describe (`Any`, a third-party class) pass unchanged.
 
@@ -47,20 +50,28 @@ def value_of(hint: Any, value: Any, where: str) -> Any:
     if origin in (typing.Union, types.UnionType):
         return _optional(parts, value, where)
     if dataclasses.is_dataclass(hint):
+        if isinstance(value, typing.cast(type, hint)):
+            return value
         return build(typing.cast(type, hint), value, where)
     if origin is tuple:
-        _checked(isinstance(value, (list, tuple)), value, where, "a list")
-        return tuple(value_of(parts[0], item, f"{where}[{i}]") for i, item in enumerate(value))
+        value = value.tolist() if isinstance(value, np.ndarray) else value
+        _checked(isinstance(value, (list, tuple, range)), value, where, "a list")
+        made = tuple(value_of(parts[0], item, f"{where}[{i}]") for i, item in enumerate(value))
+        # The same object where nothing changed: sklearn.base.clone insists.
+        unchanged = isinstance(value, tuple) and all(a is b for a, b in zip(made, value, strict=True))
+        return value if unchanged else made
     if origin is list:
         _checked(isinstance(value, list), value, where, "a list")
         return [value_of(parts[0], item, f"{where}[{i}]") for i, item in enumerate(value)]
     if isinstance(origin, type) and issubclass(origin, Mapping):
         _checked(isinstance(value, Mapping), value, where, "a table")
-        return {
+        table = {
             value_of(parts[0], key, where): value_of(parts[1], item, f"{where}.{key}")
             for key, item in value.items()
         }
+        return value if all(table.get(key) is item for key, item in value.items()) else table
     if origin is Literal:
+        value = _native(value)
         # Not `in` alone: True equals 1, and a list is not hashable.
         right = any(type(part) is type(value) and part == value for part in parts)
         return _checked(right, value, where, f"one of {', '.join(map(repr, parts))}")
@@ -74,10 +85,16 @@ def _required(field: dataclasses.Field[Any]) -> bool:
 def _optional(parts: tuple[Any, ...], value: Any, where: str) -> Any:
     if value is None and type(None) in parts:
         return None
-    return value_of(next(part for part in parts if part is not type(None)), value, where)
+    *others, last = (part for part in parts if part is not type(None))
+    for part in others:
+        with suppress(ValueError):
+            return value_of(part, value, where)
+    return value_of(last, value, where)
 
 
 def _plain(hint: Any, value: Any, where: str) -> Any:
+    if hint in (bool, int, float, str):
+        value = _native(value)
     if hint is float and isinstance(value, int) and not isinstance(value, bool):
         try:
             return float(value)
@@ -88,6 +105,11 @@ def _plain(hint: Any, value: Any, where: str) -> Any:
         fraction = hint is int and isinstance(value, float)
         return _checked(right, value, where, "a whole number" if fraction else _WANTED[hint])
     return value
+
+
+def _native(value: Any) -> Any:
+    # Python's own of a numpy scalar, as which arithmetic often returns a number.
+    return value.item() if isinstance(value, (np.generic, np.ndarray)) and value.ndim == 0 else value
 
 
 def _checked(right: bool, value: Any, where: str, wanted: str) -> Any:

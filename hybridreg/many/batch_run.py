@@ -58,6 +58,7 @@ def run(
     nonfinite: str = "raise",
     target_viewpoint: Any = "auto",
     on_row: Callable[[Row], None] = lambda row: None,
+    spoken: Callable[[str], str] = str,
 ) -> list[Row]:
     """Register every pair that the folder does not hold yet: `rows.jsonl` grows as they are done, `poses.csv` is
     written at the end. Pairs that ended with an `error` are tried again, as their files may have been mended since.
@@ -69,6 +70,7 @@ def run(
     ----------
     how : what `hybridreg.changes.build` takes: a preset or pipeline, and what differs from it
     workers : processes; None takes what `joblib.parallel_config` says, else 1
+    spoken : how `poses.csv` tells an error, whose advice names arguments of Python
 
     Returns
     -------
@@ -101,7 +103,7 @@ def run(
                 done[(row["id"], row["source"], row["target"])] = row
                 on_row(row)
         rows = [done[_key(job)] for job in jobs]
-        write_text(folder / _TABLE, _table(rows))
+        write_text(folder / _TABLE, _table(rows, spoken))
     return rows
 
 
@@ -164,12 +166,12 @@ def _one(job: Job, settings: str) -> Row:
     }
 
 
-def _table(rows: Sequence[Row]) -> str:
+def _table(rows: Sequence[Row], spoken: Callable[[str], str]) -> str:
     lines: list[Sequence[str]] = [_COLUMNS]
     for row in rows:
         T = row["T_target_source"]
         pose = [""] * 7 if T is None else position_and_quaternion(np.array(T))
-        why = row["error"] or "; ".join(row["reasons"])
+        why = spoken(row["error"] or "; ".join(row["reasons"]))
         told = (row["id"], row["source"], row["target"], row["verdict"], f"{row['confidence']:.3f}")
         lines.append((*told, *pose, f"{row['seconds']:.3f}", why))
     return csv_text(lines)

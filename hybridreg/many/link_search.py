@@ -111,9 +111,14 @@ def _key(a: int, b: int, poses: Array | None) -> Key:
     return a, b, None if start is None or not np.isfinite(start).all() else tuple(start.ravel().tolist())
 
 
+def is_row(value: Any, n: int) -> bool:
+    """Whether it counts one of `n` clouds, from 0."""
+    return isinstance(value, (int, np.integer)) and not isinstance(value, bool) and 0 <= int(value) < n
+
+
 def _given(rows: Rows, T: Any, n: int) -> Link:
     source, target = rows
-    if not (0 <= source < n and 0 <= target < n and source != target):
+    if not (is_row(source, n) and is_row(target, n) and source != target):
         raise ValueError(f"known: {rows} are no two rows of the {n} clouds")
     pose = se3.check(T, f"known[{source}, {target}]")
     return Link(

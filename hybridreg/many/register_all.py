@@ -5,11 +5,11 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, Literal
 
 from hybridreg.cloud import PointCloud
 from hybridreg.many.alignment import Alignment
-from hybridreg.many.link_search import Rows, aligned
+from hybridreg.many.link_search import Rows, aligned, is_row
 from hybridreg.pipeline import Pipeline
 from hybridreg.presets import DEFAULT
 
@@ -25,6 +25,7 @@ def register_all(
     pipeline: Pipeline | None = None,
     voxel: float | None = None,
     seed: int = 0,
+    nonfinite: Literal["raise", "drop"] = "raise",
     workers: int | None = None,
 ) -> Alignment:
     """Put many clouds into the frame of one of them.
@@ -45,6 +46,7 @@ def register_all(
     reference : row of the cloud whose frame all others get
     preset, voxel : as for `register`
     pipeline : instead of a preset
+    nonfinite : as for `register`
     workers : processes; None takes what `joblib.parallel_config` says (a dask cluster, for one), else 1
 
     Raises
@@ -60,9 +62,13 @@ def register_all(
             f"voxel={voxel} is a preset's; give the pipeline its own: pipeline.swap(voxel={voxel})"
         )
     told = _names(clouds, names)
-    if not 0 <= reference < len(clouds):
-        raise ValueError(f"reference={reference} must be a row of the {len(clouds)} clouds")
-    held = [PointCloud.of(cloud, name=name) for cloud, name in zip(clouds, told, strict=True)]
+    if not is_row(reference, len(clouds)):
+        raise ValueError(
+            f"reference={reference!r} must be a row of the {len(clouds)} clouds, 0 to {len(clouds) - 1}"
+        )
+    held = [
+        PointCloud.of(cloud, name=name, nonfinite=nonfinite) for cloud, name in zip(clouds, told, strict=True)
+    ]
     method = Pipeline.preset(preset, voxel=voxel) if pipeline is None else pipeline
     return aligned(
         held, told, method, ordered=ordered, known=known, reference=reference, seed=seed, workers=workers

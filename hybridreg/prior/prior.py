@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from typing import Any
 
 import numpy as np
@@ -58,7 +58,7 @@ class Prior:
     max_translation: float | None = None
     max_rotation: float | None = None
     gravity: Any = "known"
-    crop: Any = None
+    crop: Any = field(default=None, hash=False)  # a mapping, which has no hash
     scale: bool = False
 
     def __post_init__(self) -> None:

@@ -9,6 +9,7 @@ import threading
 import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
+from numbers import Integral
 from typing import Any, Literal, TypeVar
 
 T = TypeVar("T")
@@ -32,15 +33,39 @@ def spread(
 
     Parameters
     ----------
-    workers : processes; None takes what `joblib.parallel_config` says, else 1
+    workers : processes, or -1 for one a core; None takes what `joblib.parallel_config` says, else 1
     ordered : in the order of the jobs, otherwise as they finish
     singly : one job a task, so that each result comes as soon as it is ready
+
+    Raises
+    ------
+    ValueError
+        Another number of workers.
 
     Warns
     -----
     UserWarning
         The system cannot start processes (a full /dev/shm); the work is done in this one.
     """
+    _check(workers)
+    return _spread(function, jobs, workers, ordered=ordered, singly=singly)
+
+
+def _check(workers: int | None) -> None:
+    if workers is None:
+        return
+    if isinstance(workers, bool) or not isinstance(workers, Integral) or workers == 0:
+        raise ValueError(f"workers={workers!r} must be 1 or more processes, or -1 for one a core")
+
+
+def _spread(
+    function: Callable[..., T],
+    jobs: Iterable[tuple[Any, ...]],
+    workers: int | None,
+    *,
+    ordered: bool,
+    singly: bool,
+) -> Iterator[T]:
     from joblib import Parallel, delayed
     from joblib.parallel import get_active_backend
 

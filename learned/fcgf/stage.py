@@ -6,6 +6,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar
 
+from hybridreg.config import limits
 from hybridreg.learned.stages.dense_matching import DensePoints, match_dense
 from hybridreg.learned.stages.network_stage import NetworkStage
 from hybridreg.matches import Correspondences, Overlap
@@ -50,6 +51,7 @@ class Fcgf(NetworkStage):
         super().__post_init__()
         if not 0.0 <= self.min_overlap <= 1.0:
             raise ValueError(f"min_overlap={self.min_overlap} must lie in [0, 1]")
+        limits.positive(self, "voxel")
 
     def __call__(self, scene: Scene, overlap: Overlap) -> Correspondences:
         from hybridreg.learned.fcgf.batch import make_batch

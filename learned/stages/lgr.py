@@ -68,10 +68,11 @@ class Lgr(Stage):
     needs: ClassVar[frozenset[str]] = frozenset({"matches", "group"})
 
     def __post_init__(self) -> None:
+        if isinstance(self.weights, os.PathLike):
+            object.__setattr__(self, "weights", os.fspath(self.weights))
+        super().__post_init__()
         if self.max_distance is not None and not self.max_distance > 0.0:
             raise ValueError(f"max_distance={self.max_distance} must be a positive length in metres")
-        if self.weights is not None:
-            object.__setattr__(self, "weights", os.fspath(self.weights))
         if self.min_group is not None and self.min_group < 3:
             raise ValueError(f"min_group={self.min_group} must be at least 3: fewer matches fix no pose")
         if self.steps is not None and self.steps < 1:

@@ -50,8 +50,6 @@ class NetworkMatcher(NetworkStage):
         super().__post_init__()
         if self.min_overlap is not None and not 0.0 <= self.min_overlap <= 1.0:
             raise ValueError(f"min_overlap={self.min_overlap} must lie in [0, 1]")
-        if self.similarity not in (None, "unit", "raw"):
-            raise ValueError(f"similarity={self.similarity!r} must be 'unit' or 'raw'")
 
     def configured(self) -> RegistrationNetwork:
         """The network under the configuration that this stage matches with."""

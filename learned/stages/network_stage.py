@@ -54,9 +54,12 @@ class NetworkStage(Stage):
     image: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
-        if self.weights is not None:
+        if isinstance(self.weights, os.PathLike):
             object.__setattr__(self, "weights", os.fspath(self.weights))
-        elif self.size is None and not self.untrained and self.shipped in shipped_weights.names():
+        super().__post_init__()
+        if self.weights is not None:
+            return
+        if self.size is None and not self.untrained and self.shipped in shipped_weights.names():
             object.__setattr__(self, "weights", self.shipped)
         elif not self.untrained:
             raise ValueError(

@@ -25,7 +25,10 @@ def start_processes(devices: int, accelerator: str, precision: Literal["32-true"
     ------
     ImportError
         Lightning Fabric is not installed.
+    ValueError
+        An accelerator that is not here.
     """
+    _check_accelerator(accelerator)
     try:
         from lightning_fabric import Fabric
         from lightning_fabric.strategies import DDPStrategy, Strategy
@@ -49,6 +52,12 @@ def start_processes(devices: int, accelerator: str, precision: Literal["32-true"
     )
     fabric.launch()
     return fabric
+
+
+def _check_accelerator(accelerator: str) -> None:
+    here = {"cuda": torch.cuda.is_available(), "mps": torch.backends.mps.is_available()}
+    if not {**here, "gpu": any(here.values())}.get(accelerator, True):
+        raise ValueError(f"accelerator={accelerator!r}: torch finds none here; use accelerator='cpu'")
 
 
 def _round_robin(processes: int, cards: int) -> list[torch.device]:

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
+from hybridreg.config import limits
 from hybridreg.learned.losses.infonce_loss import InfoNceConfig
 from hybridreg.learned.network_table import DEFAULT, network_class
 from hybridreg.learned.training.data.augmentation import Augmentation
@@ -31,6 +32,9 @@ class Source:
     pairs: int = 0
     prepared: bool = True
 
+    def __post_init__(self) -> None:
+        limits.at_least(self, 0, "pairs")
+
     @property
     def title(self) -> str:
         """How the source is called."""
@@ -50,6 +54,7 @@ class DataPlan:
             titles = [source.title for source in sources]
             if len(set(titles)) < len(titles):
                 raise ValueError(f"data.{kind}: two sources of one name in {titles}; give each its own")
+        limits.at_least(self, 0, "loaders")
         if not self.train:
             raise ValueError("data.train is empty: give at least one source")
 
@@ -151,6 +156,8 @@ class Recipe:
         if isinstance(self.network, Mapping):
             config = network_class(self.kind).config_type.from_dict(self.network)
             object.__setattr__(self, "network", config)
+        limits.at_least(self, 0, "seed", "every")
+        limits.at_least(self, 1, "log_every")
         if not self.phase:
             raise ValueError("a recipe needs at least one [[phase]]")
         known = {source.title for source in self.data.train}

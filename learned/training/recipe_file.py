@@ -57,6 +57,9 @@ def parse(table: Mapping[str, Any], *, name: str) -> Recipe:
     ``network`` names the network, or is a table that alters it (with its name as ``name``); ``size``, and for
     Cross3DReg ``omp`` and ``vgam``, choose its configuration.
     """
+    known = {each.name for each in dataclasses.fields(Recipe)} - {"kind"} | {"base", *_NETWORK_KEYS}
+    if unknown := sorted(set(table) - known):
+        raise ValueError(f"recipe: unknown keys {unknown}; known are {sorted(known)}")
     base: dict[str, Any] = {
         key: value_of(type(default), table.get(key, default), f"recipe.{key}")
         for key, default in _NETWORK_KEYS.items()
@@ -73,7 +76,7 @@ def parse(table: Mapping[str, Any], *, name: str) -> Recipe:
         if parts:
             raise ValueError(f"recipe.{parts[0]}: a part of {DEFAULT}, which {kind} does not have")
         network = _other_network(kind, base["size"], altered)
-    rest = {key: value for key, value in table.items() if key not in (*_NETWORK_KEYS, "kind")}
+    rest = {key: value for key, value in table.items() if key not in _NETWORK_KEYS}
     return build(Recipe, {"name": name, **rest, "network": network, "kind": kind}, "recipe")
 
 

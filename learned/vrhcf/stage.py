@@ -68,8 +68,6 @@ class Vrhcf(NetworkStage):
             raise ValueError(
                 f"max_keypoints={self.max_keypoints} must be at least 3: fewer matches fix no pose"
             )
-        if self.matching not in (None, "channels", "unit"):
-            raise ValueError(f"matching={self.matching!r} must be 'channels', 'unit' or None")
 
     def __call__(self, scene: Scene, overlap: Overlap) -> Correspondences:
         import torch

@@ -183,7 +183,7 @@ def test_disjoint_places_give_some_pose_within_reach() -> None:
 @pytest.mark.parametrize(
     ("fields", "words"),
     [
-        ({"vertical": "wall"}, "'ground', 'sensor' or 'both'"),
+        ({"vertical": "wall"}, "'ground', 'sensor', 'both', got"),
         ({"voxel": 0.0}, "voxel=0.0"),
         ({"layers": (1.0,)}, "two or more"),
         ({"layers": (2.0, 1.0)}, "rising"),

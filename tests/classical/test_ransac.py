@@ -198,7 +198,7 @@ def test_open3d_backend_finds_the_same_pose(scene: Scene) -> None:
         ({"edge_ratio": 1.5}, "edge_ratio=1.5"),
         ({"confidence": -0.1}, "confidence=-0.1"),
         ({"max_matches": 2}, "max_matches=2"),
-        ({"backend": "pcl"}, "backend='pcl'"),
+        ({"backend": "pcl"}, "backend: expected one of 'own', 'open3d', got 'pcl'"),
     ],
 )
 def test_bad_settings(fields: dict[str, object], message: str) -> None:

@@ -66,7 +66,7 @@ def test_plane_step_converges_and_leaves_an_open_direction_alone() -> None:
 
 
 def test_icp_refuses_an_unknown_kind() -> None:
-    with pytest.raises(ValueError, match="'point' or 'plane'"):
+    with pytest.raises(ValueError, match="kind: expected one of 'point', 'plane'"):
         hr.Icp(kind="line")  # type: ignore[arg-type]
 
 

@@ -3,7 +3,9 @@
 
 from __future__ import annotations
 
+import json
 import re
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -12,14 +14,18 @@ from typer.testing import CliRunner, Result
 
 from hybridreg import testing
 from hybridreg.cli.app import app
-from hybridreg.cli.terminal.command_line_cures import WORDS, spoken
+from hybridreg.cli.terminal.command_line_cures import CURES, VALUES, options_in, spoken
 
 ROOT = Path(__file__).parents[2]
 IDENTITY = ["--set", "match=none", "--set", "estimate=identity", "--set", "refine=none"]
 
 
+def call(*arguments: str | Path) -> Result:
+    return CliRunner().invoke(app, [*map(str, arguments)])
+
+
 def register(*arguments: str | Path) -> Result:
-    return CliRunner().invoke(app, ["register", *map(str, arguments)])
+    return call("register", *arguments)
 
 
 @pytest.fixture
@@ -40,15 +46,21 @@ def test_every_phrase_is_one_that_the_library_says() -> None:
         if "cli" not in file.parts
     )
     source = re.sub(r'"\s*\n\s*f?"', "", source)
-    for said, _ in WORDS:
-        core = said.split("=(")[0].replace(r"\b", "").replace("(smaller|larger)", "smaller").replace("\\", "")
+    for said, _ in (*CURES, *VALUES):
+        core = (
+            re.split(r"='?\(", said)[0]
+            .replace(r"\b", "")
+            .replace("(smaller|larger)", "smaller")
+            .replace("\\", "")
+        )
         assert core in source or core.replace("smaller", "larger") in source, said
 
 
 def test_every_option_exists() -> None:
-    known = register("--help").output
-    for option in {each for _, means in WORDS for each in re.findall(r"--[a-z-]+", means)}:
-        assert option in re.sub(r"\x1b\[[0-9;]*m", "", known), option
+    known = "".join(call(name, "--help").output for name in ("register", "together", "train"))
+    for means in (*(each for _, several in CURES for each in several), *(named for _, named in VALUES)):
+        for option in options_in(means):
+            assert option in re.sub(r"\x1b\[[0-9;]*m", "", known), option
 
 
 def test_points_that_are_not_finite(cloud: Path) -> None:
@@ -57,6 +69,55 @@ def test_points_that_are_not_finite(cloud: Path) -> None:
     assert "pass --nonfinite drop" in done.output
     cured = register(cloud / "half.npy", cloud / "whole.npy", *IDENTITY, "--nonfinite", "drop")
     assert cured.exit_code in (0, 3)
+
+
+def test_points_that_are_not_finite_by_commands_with_another_option(cloud: Path) -> None:
+    files, out = (cloud / "half.npy", cloud / "whole.npy"), ("--out", cloud / "out")
+    said = " ".join(call("together", *files, *IDENTITY, *out).output.split())
+    assert "remove them or pass --drop" in said
+    assert call("together", *files, *IDENTITY, *out, "--drop").exit_code in (0, 3)
+    shutil.rmtree(cloud / "out")
+    done = call("batch", cloud / "half.npy", "--target", cloud / "whole.npy", *IDENTITY, *out)
+    assert "remove them or pass --drop" in " ".join(done.output.split())
+    assert "remove them or pass --drop" in (cloud / "out" / "poses.csv").read_text()
+
+
+def test_points_that_are_not_finite_where_no_option_drops_them(cloud: Path) -> None:
+    pair = cloud / "data" / "one"
+    pair.mkdir(parents=True)
+    (cloud / "half.npy").rename(pair / "source.npy")
+    (cloud / "whole.npy").rename(pair / "target.npy")
+    (pair / "meta.json").write_text(json.dumps({"T_target_source": np.eye(4).tolist()}))
+    done = call("eval", "--data", f"{pair.parent}#trusted", *IDENTITY, "--out", cloud / "run")
+    said = " ".join(done.output.split())
+    assert "remove them" in said
+    assert "nonfinite" not in said
+    assert "nonfinite=" not in "".join(file.read_text() for file in (cloud / "run").rglob("*.jsonl"))
+
+
+@pytest.mark.parametrize(
+    "row, said",
+    [
+        ('voxel = "x"', "voxel='x' must be"),
+        ("prior = { max_rotation = -3 }", "max_rotation=-3 must be"),
+        ('match = { stage = "geotransformer", size = "nano" }', "insist with untrained = true"),
+    ],
+)
+def test_a_file_of_a_table_has_keys_and_no_options(row: str, said: str, tmp_path: Path) -> None:
+    (tmp_path / "x.toml").write_text(f"[[row]]\n{row}\n")
+    done = call("table", tmp_path / "x.toml", "--data", tmp_path, "--out", tmp_path / "run")
+    told = " ".join(done.output.split())
+    assert done.exit_code == 2
+    assert said in told
+    assert "--" not in told
+
+
+def test_a_value_of_a_pipelines_file_is_no_options(cloud: Path) -> None:
+    (cloud / "p.toml").write_text("[prior]\nmax_rotation = -3\n")
+    done = register(cloud / "whole.npy", cloud / "whole.npy", "--pipeline", cloud / "p.toml")
+    assert "max_rotation=-3 must be" in " ".join(done.output.split())
+    both = register(cloud / "whole.npy", cloud / "whole.npy", "--pipeline", "p.toml", "--preset", "icp")
+    assert "--preset icp and --pipeline p.toml: leave one of them out" in " ".join(both.output.split())
 
 
 @pytest.mark.parametrize(

@@ -78,7 +78,15 @@ def test_a_combination_that_does_not_fit_stays_with_its_reason() -> None:
             "rows: unknown; a table has base, data, paper, protocols, row, seed, starts, sweep, title",
         ),
         ({"row": [{"preset": "icp"}, {"preset": "icp"}]}, "two rows are called 'icp'"),
-        ({"row": [{"preset": "icp", "name": "Identity"}]}, "a row is called 'identity'"),
+        ({"row": [{"preset": "icp", "name": "Identity"}]}, "a row is called 'Identity'"),
+        (
+            {"row": [{"preset": "icp", "name": "λ=1"}, {"preset": "icp", "name": "μ=1"}]},
+            "the rows 'λ=1' and 'μ=1' would both be stored in 1.jsonl; give one another name",
+        ),
+        (
+            {"row": [{"preset": "icp", "name": "GICP"}, {"preset": "icp", "name": "gicp"}]},
+            "the rows 'GICP' and 'gicp' would both be stored in gicp.jsonl",
+        ),
         (
             {"row": [{"preset": "icp", "refin": "none"}]},
             "refin: unknown; a row has name, preset, pipeline, voxel",

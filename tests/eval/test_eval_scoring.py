@@ -105,8 +105,12 @@ def test_inlier_ratio_at_the_protocols_radius() -> None:
     assert score(rows, CROSS).fmr == 1.0
     assert score(rows, PROTOCOLS["fine"]).fmr == 0.0
     odd = dataclasses.replace(CROSS, inlier_m=0.7)
-    with pytest.raises(ValueError, match=r"at 0\.1, 0\.5, 1 m, not at 0\.7 m"):
+    with pytest.raises(
+        ValueError, match=r"at 0\.1, 0\.5, 1 m, not at 0\.7 m; give inlier_m one of 0\.05, .*, 2"
+    ):
         score(rows, odd)
+    with pytest.raises(ValueError, match=r"not at 0\.6 m; predict again"):
+        score(rows, dataclasses.replace(CROSS, inlier_m=0.6))
 
 
 def test_a_method_that_has_no_matches_at_one_pair_is_charged_for_it_once() -> None:

@@ -33,6 +33,12 @@ def test_two_workers_give_the_same_rows(tmp_path: Path, alone: list[dict[str, An
     np.testing.assert_equal([row.timeless for row in rows], alone)
 
 
+@pytest.mark.parametrize("workers", [0, 1.5, "2", True])
+def test_what_is_no_number_of_processes_is_refused(tmp_path: Path, workers: Any) -> None:
+    with pytest.raises(ValueError, match=f"workers={workers!r} must be 1 or more processes"):
+        predict(RowByRow(slip=0.1), Scattered(N), tmp_path / "p.jsonl", workers=workers)
+
+
 def test_rows_reach_the_disk_while_others_still_run(tmp_path: Path) -> None:
     path, seen = tmp_path / "p.jsonl", []
     method = Moody(moods=("right",), seconds=0.15)

@@ -7,6 +7,7 @@ import datetime
 import io
 import json
 import zipfile
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,7 @@ import numpy as np
 import pytest
 
 import hybridreg as hr
-from hybridreg import Pipeline, PointCloud, changes, spec
+from hybridreg import Pipeline, PointCloud, changes, registry, spec
 from hybridreg.classical.overhead import sweep as sweep_module
 from hybridreg.classical.overhead.overhead_columns import Columns, FromAbove
 from hybridreg.data.loaders.folder import load_pair
@@ -25,6 +26,7 @@ from hybridreg.io import read_points, write_json, write_points
 from hybridreg.learned.cross3dreg.config import NetworkConfig
 from hybridreg.learned.cross3dreg.sizes import named_config
 from hybridreg.learned.training import recipe_file
+from hybridreg.stage import Stage
 from hybridreg.testing import sample_pair
 from tools.hostile.containers import contain
 from tools.hostile.stored import FILES, StoredCase
@@ -114,6 +116,54 @@ def test_text_that_is_no_toml(tmp_path: Path, reader: Any, text: str) -> None:
 def test_fields_of_a_stage_from_a_file(stage: dict[str, Any], words: str) -> None:
     with pytest.raises(ValueError, match=words):
         spec.from_table(stage)
+
+
+@pytest.mark.parametrize(
+    ("slot", "name", "fields", "words"),
+    [
+        ("estimate", "ransac", {"iterations": 1.5}, "Ransac: iterations: expected a whole number, got 1.5"),
+        ("estimate", "ransac", {"iterations": float("nan")}, "iterations: expected a whole number, got nan"),
+        ("estimate", "ransac", {"iterations": "5"}, "iterations: expected a number, got '5'"),
+        ("estimate", "candidates", {"of": ("birdseye",)}, r"of\[0\]: expected a table, got 'birdseye'"),
+        ("estimate", "candidates", {"of": ({"estimate": 3},)}, "of: estimate: 3 is not a stage"),
+        ("estimate", "candidates", {"refine": 3}, "refine: 3 is not a stage"),
+        ("refine", "icp", {"max_distances": 1.0}, "max_distances: expected a list, got 1.0"),
+        ("refine", "icp", {"kind": "line"}, "kind: expected one of 'point', 'plane', got 'line'"),
+        ("match", "fpfh", {"mutual": "no"}, "mutual: expected true or false, got 'no'"),
+        ("match", "fcgf", {"untrained": "False"}, "untrained: expected true or false, got 'False'"),
+        ("match", "fcgf", {"voxel": -1, "untrained": True}, "voxel=-1.0 must be positive"),
+        ("match", "fcgf", {"voxel": "x", "untrained": True}, "voxel: expected a number, got 'x'"),
+        ("match", "fcgf", {"weights": 3}, "weights: expected a text, got 3"),
+    ],
+)
+def test_fields_of_a_stage_made_in_python(slot: str, name: str, fields: dict[str, Any], words: str) -> None:
+    with pytest.raises(ValueError, match=words):
+        registry.load(slot, name)(**fields)
+
+
+def test_numbers_of_numpy_and_lists_become_pythons() -> None:
+    made = hr.Ransac(iterations=np.int64(9), max_distance=np.float32(0.5), local_optimisation=np.bool_(True))
+    assert made == hr.Ransac(iterations=9, max_distance=0.5, local_optimisation=True)
+    assert type(made.iterations) is int
+    assert type(hr.Ransac(confidence=1).confidence) is float
+    assert hr.Icp(max_distances=[2, np.float64(1.0)]) == hr.Icp(max_distances=np.array([2.0, 1.0]))
+    assert hr.Icp(max_distances=[2]).max_distances == (2.0,)
+
+
+def test_annotations_of_other_peoples_stages_are_taken_at_their_word() -> None:
+    @dataclass(frozen=True, kw_only=True)
+    class Mine(Stage):
+        count: int | str = 1
+        lacking: float = None  # type: ignore[assignment]
+        rows: np.ndarray | None = None
+        nested: hr.Icp = hr.Icp()  # noqa: RUF009
+        anything: Any = "x"
+
+    table = np.eye(3)
+    made = Mine(count="all", rows=table, nested=hr.Icp(iterations=2))
+    assert (made.count, made.rows is table, made.nested.iterations) == ("all", True, 2)
+    with pytest.raises(ValueError, match="count"):
+        Mine(count=1.5)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(

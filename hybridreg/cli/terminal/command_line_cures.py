@@ -5,29 +5,58 @@ from __future__ import annotations
 
 import re
 
-# A phrase of a message, and the same in command-line terms.
-WORDS = (
-    (r'pass nonfinite="drop"', "pass --nonfinite drop"),
-    (r"pass image=\.\.\.", "pass --image FILE"),
-    (r"call run\(pair, matches=\.\.\.\)", "which only Python can give: Pipeline.run(pair, matches=...)"),
-    (r"choose a (smaller|larger) voxel\b", r"choose a \1 --voxel"),
-    (r"a (smaller|larger) voxel or another unit", r"a \1 --voxel or another unit"),
+from hybridreg.cli.terminal import command_options
+
+_ONLY_PYTHON = "which only Python can give: Pipeline.run(pair, matches=...)"
+_TOPIC = 'only `hybridreg register --topic` and Python (hybridreg.read(path, topic="...")) choose one'
+
+# A phrase of advice, and the same in command-line terms: the first whose options the running command has. Where it has
+# none, the stages' fields stand in a TOML file.
+CURES = (
+    (r' or pass nonfinite="drop"', (" or pass --nonfinite drop", " or pass --drop", "")),
+    (r"pass image=\.\.\.", ("pass --image FILE", "there is none here; choose a stage that needs none")),
+    (r"call run\(pair, matches=\.\.\.\)", (_ONLY_PYTHON,)),
+    (r"choose a (smaller|larger) voxel\b", (r"choose a \1 --voxel", r"choose a \1 voxel")),
+    (r"a (smaller|larger) voxel or another unit", (r"a \1 --voxel or another unit",)),
+    (r'choose one with topic="..."', ("choose one with --topic", _TOPIC)),
+    (r"without weights=\.\.\.", ("without --set SLOT.weights=...", "without weights = ...")),
+    (
+        r"insist with untrained=True",
+        ("insist with --set SLOT.untrained=true", "insist with untrained = true"),
+    ),
+    (r"use device='cpu'", ("use --set SLOT.device=cpu", 'use device = "cpu"')),
+    (r"use accelerator='cpu'", ("use --accelerator cpu",)),
+    (
+        r"say so: a viewpoint lets",
+        ("say so (--source-viewpoint, --target-viewpoint): a viewpoint lets",),
+    ),
+)
+# How a message names a value, and how it does where that was given by an option: it may also stand in a TOML file.
+VALUES = (
     (r"\bseed=(\S+) must be", r"--seed \1 must be"),
     (r"\bvoxel=(\S+) must be", r"--voxel \1 must be"),
-    (r'choose one with topic="..."', "choose one with --topic"),
     (r"\bmax_translation=", "--max-translation "),
     (r"\bmax_rotation=", "--max-rotation "),
     (r"\bvoxel=(\S+) was given", r"--voxel \1 was given"),
     (r"\bvoxel=(\S+) contradicts", r"--voxel \1 contradicts"),
-    (r"without weights=\.\.\.", "without --set SLOT.weights=..."),
-    (r"insist with untrained=True", "insist with --set SLOT.untrained=true"),
-    (r"use device='cpu'", "use --set SLOT.device=cpu"),
-    (r"say so: a viewpoint lets", "say so (--source-viewpoint, --target-viewpoint): a viewpoint lets"),
-)  # fmt: skip
+    (r"\baccelerator='(\w+)': ", r"--accelerator \1: "),
+    (r"\bpreset='(.*)' and pipeline='(.*)': ", r"--preset \1 and --pipeline \2: "),
+)
 
 
 def spoken(text: str) -> str:
-    """A message whose advice a user of the command line can follow."""
-    for said, means in WORDS:
-        text = re.sub(said, means, text)
+    """A message whose advice a user of the running command can follow; unchanged where none runs."""
+    offered, given = command_options.offered(), command_options.given()
+    if offered is None:
+        return text
+    for said, means in CURES:
+        fit = next((each for each in means if options_in(each) <= offered), None)
+        text = text if fit is None else re.sub(said, fit, text)
+    for said, named in VALUES:
+        text = re.sub(said, named, text) if options_in(named) <= given else text
     return text
+
+
+def options_in(text: str) -> set[str]:
+    """The options that a text tells its reader to give to this command."""
+    return set(re.findall(r"(?<!register )--[a-z-]+", text))

@@ -14,7 +14,7 @@ from typing import ParamSpec
 
 import typer
 
-from hybridreg.cli.terminal import stop_signals
+from hybridreg.cli.terminal import command_options, stop_signals
 from hybridreg.cli.terminal.command_line_cures import spoken
 from hybridreg.cli.terminal.console import make_ready
 from hybridreg.cli.terminal.memory_errors import lacks_memory, memory_sentence, require_addresses
@@ -43,7 +43,11 @@ def plainly(command: Callable[P, None]) -> Callable[P, None]:
     @wraps(command)
     def wrapped(*args: P.args, **kwargs: P.kwargs) -> None:
         make_ready()
-        with warnings.catch_warnings(), stop_signals.stoppable():
+        with (
+            command_options.running(command, kwargs),
+            warnings.catch_warnings(),
+            stop_signals.stoppable(),
+        ):
             warnings.simplefilter("default", UserWarning)
             # From workers that are stopped early on purpose.
             warnings.filterwarnings("ignore", message=".*tasks which were still being processed")

@@ -11,6 +11,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from hybridreg import gate
 from hybridreg.config.plain_values import value_of
 from hybridreg.data import content
 from hybridreg.data.dataset import Dataset
@@ -135,15 +136,18 @@ def load_pair(folder: Path) -> LabelledPair:
     files = _files(folder)
     meta = _read_meta(files["meta"])
     facts = {key: meta[key] for key in _FREE_FACTS if key in meta}
-    pair = Pair.of(
-        files["source"],
-        files["target"],
-        files.get("image"),
-        id=folder.name,
-        meta=facts,
-        source_viewpoint=_viewpoint(meta, "source"),
-        target_viewpoint=_viewpoint(meta, "target"),
-    )
+    try:
+        pair = Pair.of(
+            files["source"],
+            files["target"],
+            files.get("image"),
+            id=folder.name,
+            meta=facts,
+            source_viewpoint=_viewpoint(meta, "source"),
+            target_viewpoint=_viewpoint(meta, "target"),
+        )
+    except ValueError as error:
+        raise ValueError(str(error).replace(gate.OR_DROP, "")) from error
     truth = se3.check(meta["T_target_source"], f"{files['meta']}: T_target_source")
     overlap = value_of(float | None, meta.get("overlap"), f"{files['meta']}: overlap")
     return LabelledPair(pair=pair, T_target_source=truth, overlap=overlap)

@@ -79,7 +79,7 @@ def test_raw_similarity_chooses_other_superpoints(shifted: Shifted, make_weights
     )
     assert len(raw) > 0
     assert not same(unit, raw)
-    with pytest.raises(ValueError, match="similarity='cosine'"):
+    with pytest.raises(ValueError, match="similarity: expected one of .*'cosine'"):
         GeoTransformer(weights=weights, similarity="cosine")  # type: ignore[arg-type]
 
 

@@ -28,6 +28,14 @@ PHASE = {"name": "p", "steps": 2}
     ("changes", "told"),
     [
         ({"sed": 1}, r"recipe: unknown keys \['sed'\]; known are .*'seed'"),
+        (
+            {"foo": 1},
+            r"unknown keys \['foo'\]; known are \['augmentation', 'base', .*'omp', .*'size', 'start', 'vgam'\]",
+        ),
+        ({"kind": "fcgf"}, r"unknown keys \['kind'\]"),
+        ({"seed": -1}, r"mine\.toml: seed=-1 must be at least 0"),
+        ({"log_every": 0}, "log_every=0 must be at least 1"),
+        ({"data": {"train": [{"data": "a", "pairs": -1}]}}, "pairs=-1 must be at least 0"),
         ({"seed": "one"}, r"recipe\.seed: expected a number, got 'one'"),
         ({"size": "huge"}, "unknown size 'huge'; known are full, small"),
         ({"network": {"backbone": {"voxle": 1.0}}}, r"backbone: unknown keys \['voxle'\]"),
@@ -58,6 +66,14 @@ def test_a_mistake_names_its_key_and_what_would_do(
     with pytest.raises(ValueError, match=told) as raised:
         recipe_file.read(file)
     assert str(raised.value).startswith(str(file))
+
+
+@pytest.mark.skipif(torch.cuda.is_available(), reason="a GPU is here")
+def test_an_accelerator_that_is_not_here_is_told_in_one_line(tmp_path: Path) -> None:
+    arguments = ["train", "smoke", "--out", str(tmp_path / "run"), "--cache", str(tmp_path / "cache")]
+    done = CliRunner().invoke(app, [*arguments, "--accelerator", "cuda"])
+    assert done.exit_code == 2
+    assert done.output == "hybridreg: --accelerator cuda: torch finds none here; use --accelerator cpu\n"
 
 
 def test_a_file_that_is_none(tmp_path: Path) -> None:

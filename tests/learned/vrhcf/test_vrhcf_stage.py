@@ -105,7 +105,7 @@ def test_wrong_fields_and_weights_are_refused(tmp_path: Path) -> None:
         hr.Vrhcf(size="nano")
     for fields, message in (
         ({"max_keypoints": 2}, "max_keypoints=2"),
-        ({"matching": "rows"}, "matching='rows'"),
+        ({"matching": "rows"}, "matching: expected one of 'channels', 'unit', got 'rows'"),
         ({"min_overlap": -1.0}, "min_overlap"),
     ):
         with pytest.raises(ValueError, match=message):
