@@ -8,7 +8,7 @@ import inspect
 import pickle
 import random
 import sys
-from collections.abc import Callable, Collection
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -19,13 +19,12 @@ from hybridreg.matches import Correspondences, Overlap, Pose
 from hybridreg.scene import Level, Scene
 from hybridreg.slots import SLOTS
 from hybridreg.testing.small_inputs import sample_scene, true_matches
+from hybridreg.testing.stage_outputs import error_m, same, valid
 
 Array = NDArray[np.float64]
 Check = Callable[[Any, str], None]
 # Metres that a refinement may end farther from the true pose than twice its start.
 _ASIDE = 0.5
-# Spacings within which a match lies at some point of its cloud.
-_AT_A_POINT = 2.0
 
 
 def checks() -> list[Check]:
@@ -93,7 +92,7 @@ def check_parameters(stage: Any, slot: str) -> None:
 def check_pickle_and_clone(stage: Any, slot: str) -> None:
     """Survives pickling and copying, unchanged."""
     for other in (pickle.loads(pickle.dumps(stage)), copy.deepcopy(stage)):
-        _same(_run(stage, slot), _run(other, slot))
+        same(_run(stage, slot), _run(other, slot))
     if hasattr(stage, "get_params"):
         params = stage.get_params(deep=False)
         clone = type(stage)(**params)
@@ -115,7 +114,7 @@ def check_output(stage: Any, slot: str) -> None:
     before = {name: array.copy() for name, array in given.items()}
     out = _run(stage, slot, scene, matches, pose)
     called = slot != "match" or _takes_overlap(stage)
-    _valid(out, slot, scene, promised=getattr(stage, "gives", ()) if called else ())
+    valid(out, slot, scene, promised=getattr(stage, "gives", ()) if called else ())
     given["the matches"] = np.hstack([matches.source, matches.target, matches.weight[:, None]])
     for name, array in given.items():
         assert np.array_equal(before[name], array), f"{name} changed in place"
@@ -124,13 +123,13 @@ def check_output(stage: Any, slot: str) -> None:
 def check_seed(stage: Any, slot: str) -> None:
     """The same generator gives the same bits, and nothing else is random."""
     states = _global_states()
-    _same(_run(stage, slot), _run(stage, slot))
+    same(_run(stage, slot), _run(stage, slot))
     for name, state in _global_states().items():
         assert states.get(name, state) == state, f"the global generator of {name} was used"
 
 
 def _global_states() -> dict[str, bytes]:
-    states = {"random": repr(random.getstate()).encode(), "numpy": np.random.get_state()[1].tobytes()}  # type: ignore[union-attr,index]
+    states = {"random": repr(random.getstate()).encode(), "numpy": np.random.get_state()[1].tobytes()}  # type: ignore[index]
     if "torch" in sys.modules:
         states["torch"] = sys.modules["torch"].get_rng_state().numpy().tobytes()
     return states
@@ -158,7 +157,7 @@ def check_permuted_points(stage: Any, slot: str) -> None:
             "the number of matches depends on the order"
         )
     if slot in ("estimate", "refine"):
-        error = _error_m(one.T, two.T, scene)
+        error = error_m(one.T, two.T, scene)
         assert error < 0.5 or not (one.found and two.found), (
             f"the pose moves by {error:.2f} m with the order of points"
         )
@@ -171,7 +170,7 @@ def check_near_truth(stage: Any, slot: str) -> None:
         start = truth @ se3.yaw(1.0)
         out = stage(scene, Pose(start.copy()))
         assert out.found, "loses a pose that is nearly right"
-        begun, ended = _error_m(start, truth, scene), _error_m(out.T, truth, scene)
+        begun, ended = error_m(start, truth, scene), error_m(out.T, truth, scene)
         assert ended < 2.0 * begun + _ASIDE, f"leads from {begun:.2f} m beside the true pose to {ended:.2f} m"
 
 
@@ -191,7 +190,7 @@ def check_rigid_motion(stage: Any, slot: str) -> None:
     level = Level(points=se3.apply(motion, scene.source.points), spacing=scene.source.spacing)
     one = stage(scene, matches, np.random.default_rng(0))
     two = stage(Scene(pair=scene.pair, source=level, target=scene.target), moved, np.random.default_rng(0))
-    error = _error_m(one.T, two.T @ motion, scene)
+    error = error_m(one.T, two.T @ motion, scene)
     assert error < 0.1, f"turning the source changes the aligned cloud by {error:.2f} m"
 
 
@@ -200,7 +199,7 @@ def check_no_overlap(stage: Any, slot: str) -> None:
     if slot == "match" and _takes_overlap(stage):
         scene, _ = sample_scene()
         out = stage(scene, Overlap(np.zeros(len(scene.source)), np.zeros(len(scene.target))))
-        _valid(out, slot, scene)
+        valid(out, slot, scene)
 
 
 def check_no_matches(stage: Any, slot: str) -> None:
@@ -208,7 +207,7 @@ def check_no_matches(stage: Any, slot: str) -> None:
     if slot == "estimate":
         scene, _ = sample_scene()
         out = stage(scene, Correspondences.none(), np.random.default_rng(0))
-        _valid(out, slot, scene)
+        valid(out, slot, scene)
         if getattr(stage, "needs", frozenset()):
             assert not out.found, "claims to have found a pose from no matches"
 
@@ -218,7 +217,7 @@ def check_one_match(stage: Any, slot: str) -> None:
     if slot == "estimate":
         scene, truth = sample_scene()
         one = true_matches(scene, truth, n=1)
-        _valid(stage(scene, one, np.random.default_rng(0)), slot, scene)
+        valid(stage(scene, one, np.random.default_rng(0)), slot, scene)
 
 
 def _run(
@@ -250,54 +249,3 @@ def _takes_overlap(stage: Any) -> bool:
     from hybridreg.classical.nothing import GivenMatches
 
     return not isinstance(stage, GivenMatches) and bool(inspect.signature(stage).parameters)
-
-
-def _valid(out: Any, slot: str, scene: Scene, promised: Collection[str] = ()) -> None:
-    if slot == "downsample":
-        assert isinstance(out, Scene), f"returned {type(out).__name__}, not a Scene"
-        for side, level in (("source", out.source), ("target", out.target)):
-            assert level.points.ndim == 2, f"{side}: points of shape {level.points.shape}, expected (n, 3)"
-            assert level.points.shape[1] == 3, (
-                f"{side}: points of shape {level.points.shape}, expected (n, 3)"
-            )
-            assert len(level) > 0, f"{side}: no point is left"
-            assert level.spacing > 0, f"{side}: the spacing must be a positive length"
-    elif slot == "overlap":
-        for side, level in (("source", scene.source), ("target", scene.target)):
-            p = getattr(out, side)
-            assert p.shape == (len(level),), f"{side} has shape {p.shape}, expected ({len(level)},)"
-            assert ((p >= 0) & (p <= 1)).all(), f"{side} holds values outside [0, 1]"
-    elif slot == "match":
-        assert isinstance(out, Correspondences), f"returned {type(out).__name__}, not Correspondences"
-        assert "group" not in promised or out.group is not None, "promises groups and gives none"
-        for side, level in (("source", scene.source), ("target", scene.target)):
-            found = getattr(out, side)
-            far = _AT_A_POINT * max(out.spacing or 0.0, level.spacing)
-            off = float(np.median(level.tree.query(found)[0])) if len(found) else 0.0
-            assert off < far, (
-                f"the matches' {side} lies {off:.2g} m off the {side}'s points; are the clouds swapped?"
-            )
-    else:
-        assert isinstance(out, Pose), f"returned {type(out).__name__}, not a Pose"
-        se3.check(np.asarray(out.T, dtype=np.float64))
-
-
-def _same(a: Any, b: Any) -> None:
-    for x, y in zip(_arrays(a), _arrays(b), strict=True):
-        assert np.array_equal(x, y, equal_nan=True), "two equal runs differ"
-
-
-def _arrays(out: Any) -> list[Array]:
-    if isinstance(out, Scene):
-        return [out.source.points, out.target.points]
-    if isinstance(out, Overlap):
-        return [out.source, out.target]
-    if isinstance(out, Correspondences):
-        return [out.source, out.target, out.weight]
-    return [out.T]
-
-
-def _error_m(A: Array, B: Array, scene: Scene) -> float:
-    return float(
-        np.linalg.norm(se3.apply(A, scene.source.points) - se3.apply(B, scene.source.points), axis=1).mean()
-    )
