@@ -85,15 +85,6 @@ class Correspondences:
             expected = (n, 3) if name in ("source", "target") else (n,)
             if column is not None and column.shape != expected:
                 raise ValueError(f"matches: {name} has shape {column.shape}, expected {expected}")
-        for name in ("source", "target", "weight"):
-            finite = np.isfinite(getattr(self, name).reshape(n, 1 if name == "weight" else 3)).all(axis=1)
-            if not finite.all():
-                raise ValueError(
-                    f"matches: {name} is not finite in {n - np.count_nonzero(finite)} of {n} rows (the first is row "
-                    f"{int(np.argmin(finite))}); leave these out"
-                )
-        if (lightest := float(np.min(self.weight, initial=0.0))) < 0.0:
-            raise ValueError(f"matches: a weight is {lightest:.3g}; weights must not be negative")
 
     def __len__(self) -> int:
         return len(self.source)

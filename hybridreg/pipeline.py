@@ -26,7 +26,7 @@ from hybridreg.runtime import optional_packages
 from hybridreg.runtime.resources import Clock, peak_memory_mb, reset_peak_memory
 from hybridreg.runtime.threads import one_blas
 from hybridreg.scene import Scene
-from hybridreg.slots import SLOTS, checked
+from hybridreg.slots import SLOTS, check_matches, checked
 from hybridreg.stage import Stage, own_changes, same
 
 
@@ -249,7 +249,9 @@ class Pipeline(Stage):
             if matches is None:
                 found = scene.matched(checked("match", self.match, self.match(scene, overlap)))
             else:
-                found = scene.matched(lower_matches(matches, pair))
+                found = lower_matches(matches, pair)
+                check_matches(found, "matches: some were given")
+                found = scene.matched(found)
         estimate = self.estimate if self.prior is None else self.prior.started(self.estimate)
         with clock.phase("estimate"):
             estimated = _proper(checked("estimate", self.estimate, estimate(scene, found, rng), scene))

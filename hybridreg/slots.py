@@ -72,7 +72,8 @@ def checked(slot: str, stage: Any, value: Any, scene: Scene | None = None) -> An
     Raises
     ------
     ValueError
-        It is of another type than the slot's, or an overlap of another shape or out of [0, 1]; the message names slot
+        It is of another type than the slot's, an overlap of another shape or out of [0, 1], or matches that are not
+        finite or weigh less than nothing; the message names slot
         and stage and says what to return. A pose of another shape, or that is not finite, counts as none, which the
         reasons say; one that is no rigid motion is noted.
     """
@@ -94,9 +95,26 @@ def checked(slot: str, stage: Any, value: Any, scene: Scene | None = None) -> An
                 raise ValueError(
                     f"{slot}: {name} returned an overlap of the {side} that leaves [0, 1] or is not finite; {cure}"
                 )
+    if isinstance(value, Correspondences):
+        check_matches(value, f"{slot}: {name} returned matches")
     if isinstance(value, Pose) and scene is not None:
         _check_pose(f"{slot}: {name}", value, cure, scene)
     return value
+
+
+def check_matches(found: Correspondences, whose: str) -> None:
+    """Refuse matches with coordinates or weights that are not finite, or negative weights; `whose` begins the message."""
+    for part in ("source", "target", "weight"):
+        finite = np.isfinite(getattr(found, part).reshape(len(found), 1 if part == "weight" else 3)).all(
+            axis=1
+        )
+        if not finite.all():
+            raise ValueError(
+                f"{whose} whose {part} is not finite in {np.count_nonzero(~finite)} of {len(found)} rows (the first is row "
+                f"{int(np.argmin(finite))}); leave these out"
+            )
+    if (lightest := float(np.min(found.weight, initial=0.0))) < 0.0:
+        raise ValueError(f"{whose} with a weight of {lightest:.3g}; weights must not be negative")
 
 
 def _check_pose(whose: str, pose: Pose, cure: str, scene: Scene) -> None:

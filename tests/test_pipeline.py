@@ -478,12 +478,23 @@ def test_a_pose_that_is_no_rigid_motion_is_noted() -> None:
     assert any("no rotation; the nearest one was taken" in note for note in result.notes)
 
 
-def test_matches_that_are_not_finite_or_weigh_less_than_nothing_are_refused() -> None:
-    points = np.zeros((3, 3))
-    with pytest.raises(ValueError, match=r"target is not finite in 1 of 3 rows \(the first is row 1\)"):
-        hr.Correspondences.of(points, points + [[0.0], [np.nan], [0.0]])
-    with pytest.raises(ValueError, match=r"a weight is -2"):
-        hr.Correspondences.of(points, points, [1.0, -2.0, 1.0])
+@pytest.mark.parametrize(
+    ("row", "weight", "told"),
+    [
+        (np.nan, 1.0, r"returned matches whose target is not finite in 1 of 3 rows \(the first is row 1\)"),
+        (0.0, -2.0, r"returned matches with a weight of -2"),
+        (0.0, np.inf, r"whose weight is not finite in 1 of 3 rows"),
+    ],
+)
+def test_matches_that_are_not_finite_or_weigh_less_than_nothing_are_refused(
+    row: float, weight: float, told: str
+) -> None:
+    def match(scene: Scene, overlap: Overlap) -> Correspondences:
+        points = np.zeros((3, 3))
+        return Correspondences.of(points, points + [[0.0], [row], [0.0]], [1.0, weight, 1.0])
+
+    with pytest.raises(ValueError, match=told):
+        hr.Pipeline(match=match, estimate="svd", refine="none").run(testing.sample_pair()[0])
 
 
 class Silent:

@@ -134,9 +134,8 @@ class Appender:
         if not lines:
             refuse_foreign(self.path)
             return []
-        changed = list(
-            differences(header_of(lines[0], self.path)["config"], json.loads(json.dumps(self._config)))
-        )
+        before, now = header_of(lines[0], self.path)["config"], json.loads(json.dumps(self._config))
+        changed = list(differences(_by_content(before), _by_content(now)))
         if changed:
             raise ValueError(f"{self.path} was made by another configuration ({'; '.join(changed)}); {_CURE}")
         try:
@@ -168,6 +167,13 @@ class Appender:
             told = f"{self.path} was deleted while it was being written; made again with its {len(self.done)} rows"
             warnings.warn(told, UserWarning, stacklevel=4)
         return self._file
+
+
+def _by_content(config: Mapping[str, Any]) -> dict[str, Any]:
+    # Data are the same wherever they lie, and however their path is written.
+    data = config.get("data")
+    known = isinstance(data, Mapping) and data.get("fingerprint")
+    return {**config, "data": {k: v for k, v in data.items() if k != "name"}} if known else dict(config)
 
 
 def differences(old: Any, new: Any, name: str = "") -> Iterator[str]:

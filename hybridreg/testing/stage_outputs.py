@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from hybridreg.geometry import se3
 from hybridreg.matches import Correspondences, Overlap, Pose
 from hybridreg.scene import Scene
+from hybridreg.slots import check_matches
 
 Array = NDArray[np.float64]
 
@@ -37,6 +38,7 @@ def valid(out: Any, slot: str, scene: Scene, promised: Collection[str] = ()) -> 
             assert ((p >= 0) & (p <= 1)).all(), f"{side} holds values outside [0, 1]"
     elif slot == "match":
         assert isinstance(out, Correspondences), f"returned {type(out).__name__}, not Correspondences"
+        check_matches(out, "returned matches")
         assert "group" not in promised or out.group is not None, "promises groups and gives none"
         for side, level in (("source", scene.source), ("target", scene.target)):
             found = getattr(out, side)

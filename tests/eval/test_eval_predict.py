@@ -232,7 +232,6 @@ def test_a_broken_line_in_the_middle_is_named(tmp_path: Path) -> None:
         ({"method": RowByRow(slip=0.5)}, "method.estimate.slip: 0.0 before, 0.5 now"),
         ({"seed": 1}, "seed: 0 before, 1 now"),
         ({"pairs": Scattered(3)}, "data.pairs: 2 before, 3 now"),
-        ({"data": "other"}, 'data.name: "" before, "other" now'),
     ],
 )
 def test_a_changed_configuration_is_refused_and_named(
@@ -252,6 +251,11 @@ def test_a_changed_configuration_is_refused_and_named(
     assert path.read_bytes() == before
     run(overwrite=True, **{**first, **change})
     run(**{**first, **change})
+
+
+def test_rows_belong_to_the_content_of_the_data_not_to_its_name(tmp_path: Path) -> None:
+    rows = predict(RowByRow(), Scattered(2), tmp_path / "p.jsonl", data="pairs")
+    assert predict(RowByRow(), Scattered(2), tmp_path / "p.jsonl", data="./pairs/") == rows
 
 
 def test_rows_of_another_version_are_not_mixed_in(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
