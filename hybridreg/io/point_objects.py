@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from hybridreg.io import tables
 from hybridreg.io.arrays import TOGETHER, array_points
+from hybridreg.io.formats.las_extended import records_of_header
 from hybridreg.io.formats.las_units import in_metres
 from hybridreg.io.recorded import ros_messages
 
@@ -48,7 +49,7 @@ def points_of(x: Any, name: str, depth: int = 0) -> Array:
         return _from_table(x, names, name, depth)
     _refuse_mesh(x, name)
     if hasattr(getattr(x, "header", None), "vlrs") and hasattr(x, "xyz"):  # laspy
-        return in_metres(_from_array(np.asarray(x.xyz), name), x.header.vlrs, name)
+        return in_metres(_from_array(np.asarray(x.xyz), name), records_of_header(x.header), name)
     held = _held(x)
     if held is not None and depth < _DEEPEST:
         return points_of(held, name, depth + 1)

@@ -4,12 +4,14 @@
 from __future__ import annotations
 
 import io
+from itertools import chain
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hybridreg.io.faults import fault, foreign_parser
+from hybridreg.io.formats.las_extended import extended_records
 from hybridreg.io.formats.las_header import check_las_header
 from hybridreg.io.formats.las_units import in_metres
 from hybridreg.io.record_fields import stack_axes
@@ -35,7 +37,7 @@ def parse_las(data: bytes, name: str) -> NDArray[np.float64]:
         points = np.concatenate(chunks) if chunks else np.empty((0, 3))
     if len(points) != promise.points:
         raise fault(name, f"its header promises {promise.points} points, it holds {len(points)}")
-    return in_metres(points, records, name)
+    return in_metres(points, chain(records, extended_records(data, name)), name)
 
 
 def _axes(chunk: Any) -> tuple[NDArray[np.float64], ...]:
