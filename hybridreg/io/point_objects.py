@@ -14,6 +14,7 @@ from hybridreg.io import tables
 from hybridreg.io.arrays import TOGETHER, array_points
 from hybridreg.io.formats.las_extended import records_of_header
 from hybridreg.io.formats.las_units import in_metres
+from hybridreg.io.formats.las_withheld import without_withheld
 from hybridreg.io.recorded import ros_messages
 
 Array = NDArray[np.float64]
@@ -49,12 +50,14 @@ def points_of(x: Any, name: str, depth: int = 0) -> Array:
         return _from_table(x, names, name, depth)
     _refuse_mesh(x, name)
     if hasattr(getattr(x, "header", None), "vlrs") and hasattr(x, "xyz"):  # laspy
-        return in_metres(_from_array(np.asarray(x.xyz), name), records_of_header(x.header), name)
+        points = without_withheld(_from_array(np.asarray(x.xyz), name), getattr(x, "withheld", None), name)
+        return in_metres(points, records_of_header(x.header), name)
     held = _held(x)
     if held is not None and depth < _DEEPEST:
         return points_of(held, name, depth + 1)
     if all(hasattr(x, axis) for axis in "xyz"):  # laspy's records
-        return tables.points({axis: getattr(x, axis) for axis in "xyz"}, list("xyz"), name)
+        points = tables.points({axis: getattr(x, axis) for axis in "xyz"}, list("xyz"), name)
+        return without_withheld(points, getattr(x, "withheld", None), name)
     if isinstance(x, (list, tuple)) and x and not isinstance(x[0], (list, np.ndarray, int, float)):
         rows = _named_rows(x)
         if rows is not None:
