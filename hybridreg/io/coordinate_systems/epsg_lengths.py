@@ -13,7 +13,7 @@ _TABLE = Path(__file__).with_name("epsg_lengths.json")
 def epsg_length(code: int) -> float | None:
     """Metres of the unit of a projected or vertical system; None for a code that the table does not hold.
 
-    Source: the EPSG dataset that the table names, written out by tools/epsg_lengths.py.
+    Source: the EPSG dataset that the table names, written out by tools/epsg_table.py.
     """
     return next((metres for metres, runs in _runs() if any(a <= code <= b for a, b in runs)), None)
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Write hybridreg/io/coordinate_systems/epsg_lengths.json: `python -m tools.epsg_lengths`, with pyproj installed."""
+"""Write hybridreg/io/coordinate_systems/epsg_lengths.json: `python -m tools.epsg_table`, with pyproj installed."""
 
 from __future__ import annotations
 
