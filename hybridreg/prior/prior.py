@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from hybridreg.geometry import se3
 from hybridreg.geometry.placement import Placement
 from hybridreg.geometry.pose_bounds import PoseBounds
-from hybridreg.io.pose_file import read_pose
+from hybridreg.io.poses.pose_file import read_pose
 from hybridreg.pair import Pair
 from hybridreg.prior import placing, size_search
 
