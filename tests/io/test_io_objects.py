@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import base64
 from collections import namedtuple
 from types import SimpleNamespace
 from typing import Any
@@ -159,6 +160,33 @@ def test_point_cloud_2(order: str, rows: int) -> None:
     same(message, expected)
     message.data = message.data[:100]
     assert "holds 100 bytes" in refused(message)
+
+
+def test_point_cloud_2_as_drivers_and_bridges_make_it() -> None:
+    odd = [SimpleNamespace(name=n, offset=12, datatype=7, count=1) for n in ("rgb", "rgb", "", "")]
+    message = cloud2("<", 1)
+    message.fields += odd
+    same(message, F)
+    message.data = base64.b64encode(message.data).decode()  # rosbridge
+    same(message, F)
+    table = {**vars(message), "fields": [vars(each) for each in message.fields]}
+    same(table, F)
+    same({**table, "data": base64.b64decode(message.data)}, F)
+    assert "are text, but not base64: 'no'" in refused({**table, "data": "no"})
+    together = cloud2("<", 1)
+    together.fields = [SimpleNamespace(name="xyz", offset=0, datatype=7, count=3)]
+    same(together, F)
+    message.fields[2].offset = 18
+    assert "correct their offsets" in refused(message)
+
+
+def test_point_cloud_2_whose_row_step_is_that_of_all_rows() -> None:
+    whole = cloud2("<", 1)
+    whole.data = whole.data[: 60 * 20]
+    whole.height, whole.width, whole.row_step = 4, 15, len(whole.data)
+    same(whole, F)
+    whole.data = whole.data[:-1]
+    assert "holds 1199 bytes" in refused(whole)
 
 
 def test_pandas() -> None:
