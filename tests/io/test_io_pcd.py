@@ -156,3 +156,18 @@ def test_bad_file(message):
     with pytest.raises(ValueError, match=r"a\.pcd: ") as caught:
         parse_pcd(BAD[message], "a.pcd")
     assert message in str(caught.value)
+
+
+@pytest.mark.parametrize("encoding", ["ascii", "binary", "binary_compressed"])
+def test_one_field_that_holds_all_three_coordinates(encoding):
+    points = np.random.default_rng(0).normal(size=(30, 3)).astype("<f4")
+    times = np.arange(30, dtype="<f4")
+    if encoding == "ascii":
+        body = "".join(f"{t} {x!r} {y!r} {z!r}\n" for t, (x, y, z) in enumerate(points.tolist())).encode()
+    elif encoding == "binary":
+        body = np.column_stack([times, points]).tobytes()
+    else:
+        raw = times.tobytes() + points.tobytes()
+        body = sizes(len(literal_lzf(raw)), len(raw)) + literal_lzf(raw)
+    told = header(30, encoding, FIELDS="t xyz", SIZE="4 4", TYPE="F F", COUNT="1 3")
+    np.testing.assert_array_equal(parse_pcd(told + body, "a.pcd"), points)

@@ -183,3 +183,9 @@ def test_ascii_list_without_length():
     head = header("element vertex 1", "property list uchar int a", AXES.rstrip(), word="ascii")
     with pytest.raises(ValueError, match="no length"):
         parse_ply(head + b"-1 2 3 4 5\n", "a.ply")
+
+
+def test_names_of_several_words_as_cloudcompare_writes_them():
+    xyz = [f"property float {axis}" for axis in "xyz"]
+    data = header("element vertex 2", *xyz, "property float scalar_Scan Angle", word="ascii")
+    np.testing.assert_array_equal(parse_ply(data + b"1 2 3 9\n4 5 6 9\n", "a.ply"), [[1, 2, 3], [4, 5, 6]])

@@ -3,11 +3,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import accumulate
 
 import numpy as np
 from numpy.typing import NDArray
 
+from hybridreg.io.arrays import TOGETHER
 from hybridreg.io.faults import fault
 from hybridreg.io.formats.lzf import lzf_decompress
 from hybridreg.io.formats.pcd_header import PcdHeader, parse_pcd_header
@@ -25,6 +27,11 @@ def parse_pcd(data: bytes, name: str) -> NDArray[np.float64]:
     rows in order, empty pixels as NaN. Source: the Point Cloud Library's description of PCD 0.7.
     """
     header = parse_pcd_header(data, name)
+    together = _together(header)
+    if together is not None and header.encoding == "binary_compressed":
+        return _compressed_together(data, header, together, name)
+    if together is not None:
+        header = _apart(header, together)
     columns = axis_columns(header.fields, name)
     if any(header.counts[column] != 1 for column in columns):
         raise fault(name, "x, y or z has a COUNT other than 1", "export the file with one number for each")
@@ -34,6 +41,23 @@ def parse_pcd(data: bytes, name: str) -> NDArray[np.float64]:
         record = XyzRecord.of(header.codes, header.sizes, columns)
         return record.points(data, header.body, header.points, name)
     return _compressed_points(data, header, columns, name)
+
+
+def _together(header: PcdHeader) -> int | None:
+    """The one field that holds all three coordinates, such as `xyz` with COUNT 3; None where there is none."""
+    lowered = [each.lower() for each in header.fields]
+    fitting = [k for k, each in enumerate(lowered) if each in TOGETHER and header.counts[k] == 3]
+    return fitting[0] if fitting and "x" not in lowered else None
+
+
+def _apart(header: PcdHeader, k: int) -> PcdHeader:
+    """The same layout with x, y and z for field `k`."""
+    return replace(
+        header,
+        fields=(*header.fields[:k], "x", "y", "z", *header.fields[k + 1 :]),
+        codes=(*header.codes[:k], *[header.codes[k]] * 3, *header.codes[k + 1 :]),
+        counts=(*header.counts[:k], 1, 1, 1, *header.counts[k + 1 :]),
+    )
 
 
 def pcd_viewpoint(data: bytes, name: str) -> NDArray[np.float64] | None:
@@ -64,6 +88,15 @@ def _compressed_points(
         for column in columns
     )
     return stack_axes(x, y, z)
+
+
+def _compressed_together(data: bytes, header: PcdHeader, k: int, name: str) -> NDArray[np.float64]:
+    if header.points == 0:
+        return np.empty((0, 3))
+    raw = _decompressed(data, header, sum(header.sizes), name)
+    start = sum(header.sizes[:k]) * header.points
+    values = np.frombuffer(raw, dtype=header.codes[k], count=3 * header.points, offset=start)
+    return stack_axes(*values.reshape(-1, 3).T)
 
 
 def _decompressed(data: bytes, header: PcdHeader, point_size: int, name: str) -> bytes:

@@ -106,10 +106,12 @@ def _append_property(elements: list[Element], words: list[str], name: str) -> No
 
 
 def _property(words: list[str], name: str) -> Property:
-    *types, label = words[1:] or [""]
-    is_list = types[:1] == ["list"]
-    codes = [_TYPES.get(word, "") for word in types[is_list:]]
-    if len(codes) != 1 + is_list or "" in codes or (is_list and codes[0].startswith("f")):
+    is_list = words[1:2] == ["list"]
+    first = 1 + is_list
+    # CloudCompare's scalar fields have names of several words.
+    types, label = words[first : first + 1 + is_list], " ".join(words[first + 1 + is_list :])
+    codes = [_TYPES.get(word, "") for word in types]
+    if not label or "" in codes or (is_list and codes[0].startswith("f")):
         problem = f"its header line {shorten(' '.join(words))} is not a property of a known type"
         raise fault(name, problem, f"known types are {', '.join(_TYPES)}")
     return Property(name=label, code=codes[-1], length_code=codes[0] if is_list else "")
