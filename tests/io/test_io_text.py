@@ -33,6 +33,8 @@ ACCEPTED = {
     "commented names": "//X Y Z R G B\n1.5 2 3 1 1 1\n-4 5.25 6e3 1 1 1\n7 8 -9 1 1 1\n",
     "commented names elsewhere": "# scan 4\n# z,x,y\n3,1.5,2\n6e3,-4,5.25\n-9,7,8\n",
     "count first": "3\n1.5 2 3 9\n-4 5.25 6e3 9\n7 8 -9 9\n",
+    "blocks with counts": "1\n1.5 2 3\n2\n-4 5.25 6e3\n7 8 -9\n",
+    "blocks with counts and commas": "1\n1.5,2,3\n1\n-4,5.25,6e3\n1\n7,8,-9\n",
     "byte order mark": "\ufeff1.5 2 3\n-4 5.25 6e3\n7 8 -9\n",
     "foreign letters": "# Straße 9, données\n1.5 2 3\n-4 5.25 6e3\n7 8 -9\n",
 }
@@ -65,6 +67,9 @@ REFUSED = {
     "0 fields called 'x' among 'east, north, up'": "east,north,up\n1,2,3\n",
     "2 fields called 'x'": "x,x,y,z\n1,2,3,4\n",
     "promises '4' points, 3 rows follow": "4\n1 2 3\n1 2 3\n1 2 3\n",
+    "row 3 promises '2' points, 1 rows follow": "1\n1 2 3\n2\n1 2 3\n",
+    "is a PTX scan": "9\n1\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n1 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 0 1\n"
+    + "1 2 3 0.5\n" * 9,
     "2 lines and none of numbers": "# nothing\n# here\n",
     "0 lines": "\n \n",
     "zero bytes": "\ufeff1 2 3\n".encode("utf-16-le"),

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from hybridreg.io.arrays import counts_up
 from hybridreg.io.column_names import Axes, axes_in, unit_said
-from hybridreg.io.faults import fault, shorten
-from hybridreg.io.formats.text_rows import parse_rows, text_lines
+from hybridreg.io.faults import fault
+from hybridreg.io.formats.text_rows import parse_rows, text_lines, without_counts
 from hybridreg.io.signatures import looks_binary
 
 _COMMENTS = ("#", "//", "%", ";")
@@ -24,7 +24,8 @@ def parse_text(data: bytes, name: str) -> NDArray[np.float64]:
 
     Lines that begin with `#`, `//`, `%` or `;` are comments. A first row of names (CloudCompare puts it
     behind a comment mark) tells which columns are x, y and z, and perhaps their unit; otherwise the first three are. A
-    first row of one whole number (PTS, XYZ) is the number of points and must be right. A comma is a decimal point
+    first row of one whole number (PTS, XYZ) is the number of points and must be right; such a row with its points may
+    follow again. A comma is a decimal point
     where something else separates the numbers.
 
     Raises
@@ -45,9 +46,7 @@ def parse_text(data: bytes, name: str) -> NDArray[np.float64]:
             "is a grid of heights (ESRI), not of points",
             "convert it: gdal_translate -of XYZ in.asc out.xyz",
         )
-    delimiter, comma = _delimiter(
-        rows[len(rows) // 2]
-    )  # not the first, which may be names, nor a cut-off last
+    delimiter, comma = _delimiter(_typical(rows))
     axes = _POSITION
     named = _names(rows[0], delimiter)
     if named:
@@ -55,7 +54,7 @@ def parse_text(data: bytes, name: str) -> NDArray[np.float64]:
         rows = rows[1:]
     elif first and (named := _commented_names(lines[first - 1], delimiter)):
         axes = axes_in(named, name)
-    rows = _counted(rows, name)
+    rows = without_counts(rows, name)
     points = parse_rows(
         [row.replace(",", ".") for row in rows] if comma else rows, axes.columns, name, delimiter
     )
@@ -72,6 +71,12 @@ def _in_metres(
     axes = axes._replace(metres=said) if axes.metres == 1.0 else axes
     axes.tell(name)
     return points if axes.metres == 1.0 else points * axes.metres
+
+
+def _typical(rows: list[str]) -> str:
+    # Not the first, which may be names, nor a cut-off last, nor a number of points.
+    middle = len(rows) // 2
+    return next((row for row in rows[middle:] if not row.isdecimal()), rows[middle])
 
 
 def _delimiter(row: str) -> tuple[str | None, bool]:
@@ -108,12 +113,3 @@ def _is_number(word: str) -> bool:
     except ValueError:
         return False
     return True
-
-
-def _counted(rows: list[str], name: str) -> list[str]:
-    if len(rows) < 2 or not rows[0].isdecimal():
-        return rows
-    if int(rows[0][:18]) != len(rows) - 1:
-        problem = f"its first row promises {shorten(rows[0])} points, {len(rows) - 1} rows follow"
-        raise fault(name, problem)
-    return rows[1:]
