@@ -15,7 +15,8 @@ from hybridreg.io.arrays import TOGETHER, array_points
 from hybridreg.io.formats.las_extended import records_of_header
 from hybridreg.io.formats.las_units import in_metres
 from hybridreg.io.formats.las_withheld import without_withheld
-from hybridreg.io.recorded import ros_messages
+from hybridreg.io.list_columns import listed_points
+from hybridreg.io.recorded import ros_messages, vtk_objects
 
 Array = NDArray[np.float64]
 
@@ -48,6 +49,11 @@ def points_of(x: Any, name: str, depth: int = 0) -> Array:
     names = tables.labels(x)
     if names is not None:
         return _from_table(x, names, name, depth)
+    if vtk_objects.is_vtk(x):
+        return _from_vtk(x, name)
+    clouds = _clouds_of_scene(x)
+    if clouds is not None:
+        return _from_array(clouds, name)
     _refuse_mesh(x, name)
     if hasattr(getattr(x, "header", None), "vlrs") and hasattr(x, "xyz"):  # laspy
         points = without_withheld(_from_array(np.asarray(x.xyz), name), getattr(x, "withheld", None), name)
@@ -93,7 +99,27 @@ def _from_table(x: Any, names: list[Any], name: str, depth: int) -> Array:
         )
         if together is not None:
             return points_of(x[together], name, depth + 1)
+    listed = None if isinstance(x, Mapping) else listed_points(x, names, name)
+    if listed is not None:
+        return _from_array(listed, name)
     return tables.points(x, names, name)
+
+
+def _from_vtk(x: Any, name: str) -> Array:
+    if not vtk_objects.is_cloud(x):
+        cure = "save it as .vtp and give the file, whose surface becomes points, or pass its vertices, x.GetPoints()"
+        _refuse(x, name, f"a surface or a grid is not a cloud; {cure}, where they lie densely")
+    return _from_array(vtk_objects.vtk_points(x, name), name)
+
+
+def _clouds_of_scene(x: Any) -> Array | None:
+    # trimesh's scenes: clouds alone, each moved to its place.
+    parts = getattr(x, "geometry", None)
+    if not isinstance(parts, Mapping) or not parts or not callable(getattr(x, "dump", None)):
+        return None
+    if any(hasattr(part, "faces") or not hasattr(part, "vertices") for part in parts.values()):
+        return None
+    return np.vstack([np.asarray(part.vertices, dtype=np.float64) for part in x.dump()])
 
 
 def _held(x: Any) -> Any:

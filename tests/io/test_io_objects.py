@@ -284,6 +284,56 @@ def test_small_gicp_and_plyfile() -> None:
     same(plyfile.PlyData([element]))
 
 
+def test_a_column_of_lists(tmp_path: Any) -> None:
+    pd, pl, pa = (pytest.importorskip(each) for each in ("pandas", "polars", "pyarrow"))
+    same(pd.DataFrame({"time": P[:, 0], "xyz": list(P)}))
+    same(pl.DataFrame({"xyz": P.tolist()}))
+    same(pl.DataFrame({"points": P}))
+    table = pa.table({"pts": pa.FixedSizeListArray.from_arrays(pa.array(P.ravel()), 3)})
+    same(table)
+    pytest.importorskip("pyarrow.parquet").write_table(table, tmp_path / "a.parquet")
+    same(tmp_path / "a.parquet")
+    assert "hold from 2 to 3 numbers" in refused(pd.DataFrame({"xyz": [*P[1:].tolist(), [1.0, 2.0]]}))
+    assert "not finite" in refused(pa.table({"xyz": [*P[1:].tolist(), None]}))
+    assert "name the coordinates" in refused(pl.DataFrame({"p": [{"z": 1.0, "y": 2.0, "x": 3.0}] * 60}))
+
+
+def test_arrays_x_y_and_z_of_an_archive(tmp_path: Any) -> None:
+    np.savez(tmp_path / "a.npz", x=P[:, 0], y=P[:, 1], z=P[:, 2], time=P[:, 0], T=np.eye(4))
+    same(tmp_path / "a.npz")
+    np.savez(tmp_path / "b.npz", cloud=record(("z", "f8"), ("y", "f8"), ("x", "f8")))
+    same(tmp_path / "b.npz")
+
+
+def test_vtk() -> None:
+    core, data = (pytest.importorskip(f"vtkmodules.vtkCommon{each}") for each in ("Core", "DataModel"))
+    convert = pytest.importorskip("vtkmodules.util.numpy_support").numpy_to_vtk
+    points = core.vtkPoints()
+    points.SetData(convert(P, deep=True))
+    cloud = data.vtkPolyData()
+    cloud.SetPoints(points)
+    same(points)
+    same(cloud)
+    faces = data.vtkCellArray()
+    faces.InsertNextCell(3)
+    for corner in range(3):
+        faces.InsertCellPoint(corner)
+    cloud.SetPolys(faces)
+    assert "x.GetPoints()" in refused(cloud)
+    same(cloud.GetPoints())
+    assert "empty" in refused(data.vtkPolyData())
+
+
+def test_a_scene_of_clouds_alone() -> None:
+    trimesh = pytest.importorskip("trimesh")
+    scene = trimesh.Scene()
+    place = trimesh.transformations.translation_matrix([10, 0, 0])
+    scene.add_geometry(trimesh.PointCloud(P), transform=place)
+    same(scene, P + [10, 0, 0])
+    scene.add_geometry(trimesh.creation.box())
+    assert "a scene is not a cloud" in refused(scene)
+
+
 @pytest.mark.parametrize(
     "x, cure",
     [

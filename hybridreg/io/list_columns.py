@@ -1,0 +1,47 @@
+# SPDX-License-Identifier: MIT
+"""Tables of which one column holds x, y and z of each point as a list: pandas, polars, pyarrow and Parquet."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hybridreg.io.arrays import TOGETHER
+from hybridreg.io.faults import fault, shorten
+
+Array = NDArray[np.float64]
+
+
+def listed_points(x: Any, names: list[Any], name: str) -> Array | None:
+    """The lists of a column that is called `xyz` or alike, or of the only one, (N, 3 or more); a missing one is NaN.
+    None where there is no such column of lists.
+
+    Raises
+    ------
+    ValueError
+        Lists of unequal length.
+    """
+    lowered = [str(each).lower() for each in names]
+    together = next((lowered.index(each) for each in TOGETHER if each in lowered), None)
+    if {"x", "y", "z"} & set(lowered) or (together is None and len(names) != 1):
+        return None
+    label = names[together or 0]
+    column = x.column(label) if hasattr(x, "column") and hasattr(x, "schema") else x[label]
+    if not hasattr(column, "to_numpy") or str(getattr(column, "dtype", "")).startswith("Struct"):
+        return None  # records, whose names an array would lose
+    values = column.to_numpy()
+    return values if values.ndim == 2 else _stacked(values, label, name)
+
+
+def _stacked(values: NDArray[Any], label: Any, name: str) -> Array | None:
+    rows = [each for each in values if isinstance(each, (list, tuple, np.ndarray))]
+    if not rows or any(len(rows[0]) != len(each) for each in rows):
+        if not rows:
+            return None
+        lengths = sorted({len(each) for each in rows})
+        problem = f"the lists of its column {shorten(label)} hold from {lengths[0]} to {lengths[-1]} numbers"
+        raise fault(name, problem, "give three numbers a point")
+    missing = np.full(len(rows[0]), np.nan)
+    return np.array([missing if each is None else each for each in values], dtype=np.float64)
