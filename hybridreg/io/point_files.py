@@ -86,10 +86,10 @@ def read_points(path: str | os.PathLike[str]) -> NDArray[np.float64]:
 
     The file name's ending chooses the format: `.ply` (ascii, binary), `.pcd` (ascii, binary,
     binary_compressed), `.bin` (float32 rows of three to six numbers, as KITTI and nuScenes have four and five),
-    `.npy`, `.npz` (array `xyz`, `points`, `arr_0`, the only one that fits, or `x`, `y` and `z`), text (`.xyz`, `.txt`, `.csv`, `.tsv`,
-    `.asc`, `.pts`, `.xyzn`, `.xyzrgb`, `.xyzi`), `.las`/`.laz` (extra `las`; COPC too), and what `READERS` lists: bags
-    (extra `ros`), `.e57` (extra `e57`), `.lvx2`, Arrow's tables (extra `arrow`), meshes (extra `mesh`) and `.vtp`
-    (extra `vtk`); of several clouds the first.
+    `.npy`, `.npz` (array `xyz`, `points`, `arr_0`, the only one that fits, or `x`, `y` and `z`), text (`.xyz`, `.txt`,
+    `.csv`, `.tsv`, `.asc`, `.pts`, `.xyzn`, `.xyzrgb`, `.xyzi`), `.las`/`.laz` (extra `las`; COPC too), and what
+    `READERS` lists: bags (extra `ros`), `.e57` (extra `e57`), `.lvx2`, Arrow's tables (extra `arrow`), meshes (extra
+    `mesh`) and `.vtp` (extra `vtk`); of several clouds the first.
     A file that is not what its name says is refused. Rows that are not finite are kept: the gate decides about them.
 
     Parameters
