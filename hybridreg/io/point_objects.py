@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from hybridreg.io import tables
 from hybridreg.io.arrays import TOGETHER, array_points
-from hybridreg.io.formats.las_extended import records_of_header
-from hybridreg.io.formats.las_units import in_metres
+from hybridreg.io.coordinate_systems.las_extended import records_of_header
+from hybridreg.io.coordinate_systems.las_units import in_metres
 from hybridreg.io.formats.las_withheld import without_withheld
 from hybridreg.io.list_columns import listed_points
 from hybridreg.io.recorded import ros_messages, vtk_objects

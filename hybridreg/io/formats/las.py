@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from hybridreg.io.coordinate_systems.las_extended import extended_records
+from hybridreg.io.coordinate_systems.las_units import in_metres
 from hybridreg.io.faults import fault, foreign_parser
-from hybridreg.io.formats.las_extended import extended_records
 from hybridreg.io.formats.las_header import check_las_header
-from hybridreg.io.formats.las_units import in_metres
 from hybridreg.io.formats.las_withheld import without_withheld
 from hybridreg.io.record_fields import stack_axes
 from hybridreg.runtime.optional_packages import load

@@ -11,8 +11,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
+from hybridreg.io.coordinate_systems.las_units import WELL_KNOWN_TEXT
 from hybridreg.io.faults import fault
-from hybridreg.io.formats.las_units import WELL_KNOWN_TEXT
 
 _PLACE_AND_COUNT = (
     235  # where LAS 1.4 keeps the first record's place, in 8 bytes, and how many there are, in 4
