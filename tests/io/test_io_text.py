@@ -35,6 +35,7 @@ ACCEPTED = {
     "count first": "3\n1.5 2 3 9\n-4 5.25 6e3 9\n7 8 -9 9\n",
     "blocks with counts": "1\n1.5 2 3\n2\n-4 5.25 6e3\n7 8 -9\n",
     "blocks with counts and commas": "1\n1.5,2,3\n1\n-4,5.25,6e3\n1\n7,8,-9\n",
+    "Excel's separator": "sep=;\nx;y;z\n1,5;2;3\n-4;5,25;6e3\n7;8;-9\n",
     "byte order mark": "\ufeff1.5 2 3\n-4 5.25 6e3\n7 8 -9\n",
     "foreign letters": "# Straße 9, données\n1.5 2 3\n-4 5.25 6e3\n7 8 -9\n",
 }
@@ -147,4 +148,30 @@ REFUSED_HEADS = {
 def test_refused_heads(message):
     with pytest.raises(ValueError, match=r"a\.txt: ") as caught:
         parse_text(REFUSED_HEADS[message].encode(), "a.txt")
+    assert message in str(caught.value)
+
+
+ROWS = "1.5,2,3\n4,5,6\n7,8,9\n"
+FIRST_ROWS = {
+    "its first row holds no numbers, so that it was read as the names of the columns: it has 0 fields called 'x' among "
+    "'Rechtswert, Hochwert, Höhe'; name the coordinates": f"Rechtswert,Hochwert,Höhe\n{ROWS}",
+    "read as the names of the columns: it has 0 fields called 'x' among 'E, N, H'": f"E,N,H\n{ROWS}",
+    "its first 3000 rows hold no points, from 'key0: value' on; begin those that are comments with #": "".join(
+        f"key{k}: value\n" for k in range(3000)
+    )
+    + ROWS,
+    "its first row, '! Leica', is no comment; begin comments with #": f"! Leica\n{ROWS}",
+    'its first row, "\' Trimble", is no comment': f"' Trimble\n{ROWS}",
+    "its numbers are separated by ':': '1:2:3'": "1:2:3\n" * 30,
+    "its numbers are separated by '|': '1.5|2|3'; separate them by": ROWS.replace(",", "|"),
+    "have a D before their exponents: '2.8D+01 1.0D+00 0.5D+00'; write an E": "2.8D+01 1.0D+00 0.5D+00\n"
+    * 30,
+}
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "latin-1"])
+@pytest.mark.parametrize("message", FIRST_ROWS)
+def test_a_first_row_without_numbers_is_named_as_the_cause(message, encoding):
+    with pytest.raises(ValueError, match=r"a\.txt: ") as caught:
+        parse_text(FIRST_ROWS[message].encode(encoding), "a.txt")
     assert message in str(caught.value)

@@ -11,10 +11,12 @@ from numpy.typing import NDArray
 from hybridreg.io.arrays import counts_up
 from hybridreg.io.column_names import Axes, axes_in, unit_said
 from hybridreg.io.faults import fault
+from hybridreg.io.formats.text_first_row import axes_of_first_row
 from hybridreg.io.formats.text_rows import parse_rows, text_lines, without_counts
 from hybridreg.io.signatures import looks_binary
 
 _COMMENTS = ("#", "//", "%", ";")
+_EXCEL = "sep="  # the row that tells Excel the separator
 _DECIMAL_COMMA = re.compile(r"[-+]?\d+(,\d+)?([eE][-+]?\d+)?")
 _POSITION = Axes((0, 1, 2))
 
@@ -25,8 +27,7 @@ def parse_text(data: bytes, name: str) -> NDArray[np.float64]:
     Lines that begin with `#`, `//`, `%` or `;` are comments. A first row of names (CloudCompare puts it
     behind a comment mark) tells which columns are x, y and z, and perhaps their unit; otherwise the first three are. A
     first row of one whole number (PTS, XYZ) is the number of points and must be right; such a row with its points may
-    follow again. A comma is a decimal point
-    where something else separates the numbers.
+    follow again. A comma is a decimal point where something else separates the numbers.
 
     Raises
     ------
@@ -38,6 +39,8 @@ def parse_text(data: bytes, name: str) -> NDArray[np.float64]:
     lines = [line.strip(" ") for line in text_lines(data.removeprefix(b"\xef\xbb\xbf"))]
     first = next((index for index, line in enumerate(lines) if not line.startswith(_COMMENTS)), len(lines))
     rows = [line for line in lines[first:] if not line.startswith(_COMMENTS)]
+    if rows and rows[0].lower().startswith(_EXCEL):
+        rows = rows[1:]
     if not rows:
         raise fault(name, f"has {len(lines)} lines and none of numbers", "check that the export was complete")
     if rows[0].lower().startswith("ncols"):
@@ -50,7 +53,7 @@ def parse_text(data: bytes, name: str) -> NDArray[np.float64]:
     axes = _POSITION
     named = _names(rows[0], delimiter)
     if named:
-        axes = axes_in(named, name)
+        axes = axes_of_first_row(rows, named, name)
         rows = rows[1:]
     elif first and (named := _commented_names(lines[first - 1], delimiter)):
         axes = axes_in(named, name)

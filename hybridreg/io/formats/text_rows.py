@@ -13,8 +13,12 @@ _PTX = [3, 3, 3, 3, 4, 4, 4, 4]
 
 
 def text_lines(data: bytes) -> list[str]:
-    """The lines that are not empty; bytes that are not ASCII survive in comments and names as Latin-1."""
-    lines = data.decode("latin-1").replace("\r", "\n").split("\n")
+    """The lines that are not empty, in UTF-8 where they are so, and in Latin-1, which reads any bytes, otherwise."""
+    try:
+        text = data.decode("utf-8")
+    except UnicodeDecodeError:
+        text = data.decode("latin-1")
+    lines = text.replace("\r", "\n").split("\n")
     return [line for line in lines if line and not line.isspace()]
 
 
