@@ -295,6 +295,8 @@ def test_a_column_of_lists(tmp_path: Any) -> None:
     same(tmp_path / "a.parquet")
     assert "hold from 2 to 3 numbers" in refused(pd.DataFrame({"xyz": [*P[1:].tolist(), [1.0, 2.0]]}))
     assert "not finite" in refused(pa.table({"xyz": [*P[1:].tolist(), None]}))
+    assert "name the coordinates" in refused(pl.DataFrame({"quaternion": [[0.0, 0.0, 0.0, 1.0]] * 60}))
+    assert "something else than numbers" in refused(pd.DataFrame({"xyz": [["a", "b", "c"]] * 60}))
     assert "name the coordinates" in refused(pl.DataFrame({"p": [{"z": 1.0, "y": 2.0, "x": 3.0}] * 60}))
 
 

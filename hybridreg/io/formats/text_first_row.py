@@ -14,7 +14,6 @@ _THREE = re.compile(rf"{_NUMBER}(?:[\s,;]+{_NUMBER}){{2}}")
 # Three numbers with another separator, or with Fortran's exponents of double precision.
 _OTHER_MARK = re.compile(rf"{_NUMBER}\s*([|:/_&])\s*{_NUMBER}\s*\1\s*{_NUMBER}")
 _FORTRAN = re.compile(rf"{_NUMBER}[dD][-+]?\d+[\s,;]")
-_OWN_COMMENTS = "#, //, % or ;"
 
 
 def axes_of_first_row(rows: Sequence[str], names: Sequence[str], name: str) -> Axes:
@@ -52,8 +51,8 @@ def _instead(rows: Sequence[str]) -> tuple[str, str]:
         problem = f"its first {without} rows hold no points, from {shorten(row)} on"
         return (
             problem,
-            f"begin those that are comments with {_OWN_COMMENTS}; one row may name the columns x, y and z",
+            "begin those that are comments with #; one row may name the columns x, y and z",
         )
     if (not row[:1].isalnum() and row[:1] not in "\"'<([{_,") or row[:2] == "' ":
-        return f"its first row, {shorten(row)}, is no comment", f"begin comments with {_OWN_COMMENTS}"
+        return f"its first row, {shorten(row)}, is no comment", "begin comments with #"
     return "", ""
