@@ -57,7 +57,7 @@ def points_of(x: Any, name: str, depth: int = 0) -> Array:
     _refuse_mesh(x, name)
     if hasattr(getattr(x, "header", None), "vlrs") and hasattr(x, "xyz"):  # laspy
         points = without_withheld(_from_array(np.asarray(x.xyz), name), getattr(x, "withheld", None), name)
-        return in_metres(points, records_of_header(x.header), name)
+        return in_metres(points, records_of_header(x.header, name), name)
     held = _held(x)
     if held is not None and depth < _DEEPEST:
         return points_of(held, name, depth + 1)

@@ -118,6 +118,7 @@ def test_millimetres_of_a_local_system_become_metres() -> None:
         ({"keys": {1024: 1, 3072: 1999}}, "EPSG:1999"),
         ({"keys": {1024: 1, 3072: 2229, 3076: 9014}}, "unit EPSG:9014"),
         ({"keys": {1024: 1, 3072: 25832, 4096: 5103}}, "EPSG:5103"),
+        ({"keys": {1024: 1, 3072: 32767}}, "defined by its writer"),
         ({"wkt": "x"}, "'x'"),
         ({"wkt": 'LOCAL_CS["Site A"]'}, "'Site A'"),
     ],
@@ -164,3 +165,12 @@ def test_objects_of_laspy_tell_their_unit_too() -> None:
         record = laspy.read(io.BytesIO(las(P, **made)))
         with pytest.warns(UserWarning, match=r"cloud: its header says that its unit is 0\.3048 m"):
             np.testing.assert_allclose(PointCloud.of(record).points, P * 0.3048, atol=1e-6)
+
+
+def test_an_object_whose_records_behind_the_points_were_not_read_says_so() -> None:
+    from hybridreg import PointCloud
+
+    with laspy.open(io.BytesIO(las(P, wkt=FEET, behind=True)), read_evlrs=False) as reader:
+        record = laspy.LasData(reader.header, reader.read_points(len(P)))
+    with pytest.warns(UserWarning, match="1 records behind its points were not read.*laspy.read"):
+        np.testing.assert_allclose(PointCloud.of(record).points, P, atol=1e-6)

@@ -10,6 +10,7 @@ from hybridreg.io.coordinate_systems.length_unit import LengthUnit
 
 # EPSG's codes of units of length, and the metres of one.
 _LENGTHS = {9001: 1.0, 9002: 0.3048, 9003: 1200 / 3937, 9036: 1000.0, 1025: 1e-3, 1033: 1e-2}
+_OWN = 32767  # a system or a unit that is no code of EPSG's
 _MODEL, _GEOGRAPHIC = 1024, 2  # GTModelTypeGeoKey, and its ModelTypeGeographic
 _DEGREES = 2048  # GeographicTypeGeoKey: the system itself, or the one beneath a projected system
 _ACROSS, _ACROSS_UNIT = 3072, 3076  # ProjectedCSTypeGeoKey, ProjLinearUnitsGeoKey
@@ -33,9 +34,13 @@ def unit_of_keys(keys: Mapping[int, int]) -> LengthUnit:
 def _length(keys: Mapping[int, int], system: int, unit: int) -> tuple[float | None, str]:
     """Metres, None where nothing is said or known; and in words what is said and not known."""
     if unit in keys:
-        metres, words = _LENGTHS.get(keys[unit]), f"unit EPSG:{keys[unit]}"
+        metres, words = _LENGTHS.get(keys[unit]), f"unit {_told(keys[unit])}"
     elif system in keys:
-        metres, words = epsg_length(keys[system]), f"EPSG:{keys[system]}"
+        metres, words = epsg_length(keys[system]), _told(keys[system])
     else:
         return None, ""
     return metres, "" if metres else words
+
+
+def _told(code: int) -> str:
+    return "defined by its writer" if code == _OWN else f"EPSG:{code}"
