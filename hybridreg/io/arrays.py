@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from hybridreg.io.column_names import axes_in
 from hybridreg.io.faults import fault
+from hybridreg.io.meaning.image_shapes import check_photo, refuse_image
 from hybridreg.io.record_fields import stack_axes
 
 Array = NDArray[np.float64]
@@ -56,11 +57,16 @@ def array_points(array: NDArray[Any], name: str, *, batched: bool = False) -> Ar
 
 def counts_up(column: NDArray[Any]) -> bool:
     """Whether a column holds row numbers: at least 20 values, each one more than the last."""
-    return bool(len(column) >= FEWEST and column[1] - column[0] == 1 and np.all(np.diff(column) == 1))
+    # As floats: the difference of unsigned numbers overflows.
+    if len(column) < FEWEST or float(column[1]) - float(column[0]) != 1.0:
+        return False
+    return bool(np.all(np.diff(column.astype(np.float64)) == 1.0))
 
 
 def _rows(array: NDArray[Any], name: str, batched: bool) -> NDArray[Any]:
     shape = array.shape
+    if array.ndim == 3 and {shape[0], shape[2]} & {3, 4}:
+        check_photo(array, name)
     if array.ndim == 2 and shape[0] in range(3, _MOST_CHANNELS + 1) and shape[1] >= FEWEST:
         return array.T
     if array.ndim == 3 and 3 <= shape[2] <= _MOST_CHANNELS and not (batched and shape[0] > 1):
@@ -74,9 +80,14 @@ def _rows(array: NDArray[Any], name: str, batched: bool) -> NDArray[Any]:
         return array.reshape(shape[0], -1).T
     if array.ndim == 2 and shape[1] >= 3:
         if shape[0] < FEWEST <= shape[1]:
-            cure = "if they are channels, transpose and choose: x[:3].T"
+            cure = (
+                "if they are channels, transpose and choose: x[:3].T; a range image must be unprojected first"
+            )
             raise fault(name, f"expected an array of shape (N, 3), got {shape}, {shape[0]} points", cure)
+        refuse_image(shape[0], shape[1], name)
         return array
+    if np.squeeze(array).ndim == 2:
+        refuse_image(*np.squeeze(array).shape, name)
     raise fault(name, f"expected an array of shape (N, 3), got {shape}", _shape_cure(array, batched))
 
 

@@ -44,6 +44,7 @@ def points_of(x: Any, name: str, depth: int = 0) -> Array:
             x.point["positions"].cpu().numpy() if "positions" in x.point else np.empty((0, 3)), name
         )
     names = tables.labels(x)
+    _refuse_grid(x, names, name)
     if names is not None:
         return _from_table(x, names, name, depth)
     _refuse_mesh(x, name)
@@ -122,6 +123,19 @@ def _named_rows(rows: Any) -> Any:
     if all(hasattr(first, axis) for axis in "xyz"):
         return {axis: [getattr(row, axis) for row in rows] for axis in "xyz"}
     return None
+
+
+def _refuse_grid(x: Any, names: list[Any] | None, name: str) -> None:
+    # xarray's: heights or ranges over the dimensions x and y, which are their coordinates.
+    flat = {str(each).lower() for each in getattr(x, "dims", ())}
+    if (
+        not {"x", "y"} <= flat
+        or not hasattr(x, "to_dataframe")
+        or {"x", "y", "z"} <= {*map(str, names or ())}
+    ):
+        return
+    call = "to_dataframe()" if hasattr(x, "data_vars") else 'to_dataframe("z")'
+    _refuse(x, name, f"it is a grid over x and y, not points; if it holds heights: x.{call}.reset_index()")
 
 
 def _refuse_mesh(x: Any, name: str) -> None:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from hybridreg.io.arrays import array_points
 from hybridreg.io.column_names import axes_in, find_axes
 from hybridreg.io.faults import fault, shorten
+from hybridreg.io.meaning.image_shapes import refuse_image
 from hybridreg.io.record_fields import stack_axes
 
 Array = NDArray[np.float64]
@@ -48,11 +49,13 @@ def points(x: Any, names: list[Any], name: str) -> Array:
         No columns, or several, that could be x, y and z; columns of unequal length, or without numbers.
     """
     told = [str(each[-1]) if isinstance(each, tuple) else str(each) for each in names]
-    if len(names) >= 3 and all(_UNNAMED.fullmatch(each) for each in told) and find_axes(told, name) is None:
+    unnamed = len(names) >= 3 and all(_UNNAMED.fullmatch(each) for each in told)
+    if unnamed:
+        refuse_image(len(_numbers(x, 0, names, name)), len(names), name)
+    if unnamed and find_axes(told, name) is None:
         # Positions again: the first may count the rows.
-        return array_points(
-            np.column_stack([_numbers(x, k, names, name) for k in range(min(4, len(names)))]), name
-        )
+        columns = [_numbers(x, k, names, name) for k in range(min(4, len(names)))]
+        return array_points(np.column_stack(columns), name)
     axes = axes_in(told, name)
     columns = [_numbers(x, k, names, name) for k in axes.columns]
     if len({len(column) for column in columns}) > 1:

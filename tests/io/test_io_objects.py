@@ -106,6 +106,44 @@ def test_a_column_that_counts_is_no_coordinate() -> None:
     assert "is a row number" in refused(np.c_[np.arange(1, 61), P, P])
 
 
+IMAGE = np.random.default_rng(1).uniform(0.5, 9, (64, 1024)).astype("f4")
+
+
+@pytest.mark.parametrize("kind", ["f4", "u2"])
+@pytest.mark.parametrize("shape", [(64, 1024), (1024, 64), (1, 64, 1024), (64, 1024, 1)])
+def test_an_image_is_no_cloud(shape: tuple[int, ...], kind: str) -> None:
+    pixels = (IMAGE * 7000).astype(kind).reshape(shape)
+    assert "64" in refused(pixels)
+    assert "an image; unproject" in refused(pixels).replace(", not a row for each point", "")
+
+
+def test_images_of_torch_pandas_and_xarray() -> None:
+    assert "an image" in refused(pytest.importorskip("torch").tensor(IMAGE))
+    assert "an image" in refused(pytest.importorskip("pandas").DataFrame(IMAGE))
+    heights = pytest.importorskip("xarray").DataArray(
+        IMAGE, dims=("y", "x"), coords={"x": np.arange(1024.0), "y": np.arange(64.0)}
+    )
+    assert 'x.to_dataframe("z").reset_index()' in refused(heights)
+    assert len(PointCloud.of(heights.to_dataframe("z").reset_index())) == IMAGE.size
+    assert "x.to_dataframe().reset_index()" in refused(heights.to_dataset(name="z"))
+
+
+def test_a_photo_is_no_cloud() -> None:
+    photo = np.random.default_rng(1).integers(0, 256, (48, 64, 3)).astype("u1")
+    assert "colours of a photo" in refused(photo)
+    assert "colours of a photo" in refused(np.moveaxis(photo, -1, 0))
+    with pytest.warns(UserWarning, match="48 x 64 values are those of a photo"):
+        PointCloud.of(photo / 255.0)
+
+
+@pytest.mark.filterwarnings("error")
+def test_features_of_each_point_are_no_image() -> None:
+    points = np.random.default_rng(1).normal(size=(5000, 3))
+    same(np.c_[points, np.ones((5000, 64))], points)
+    same(np.c_[P, np.ones((60, 33))])
+    assert len(PointCloud.of((points * 100 + 1000).astype("u2"))) == 5000
+
+
 def test_tensors() -> None:
     torch = pytest.importorskip("torch")
     same(torch.tensor(P, requires_grad=True))

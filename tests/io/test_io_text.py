@@ -134,6 +134,7 @@ REFUSED_HEADS = {
     "longitudes and latitudes": "lon,lat,h\n7.1,50.7,100\n",
     "several columns that could be": "pos_x,pos_y,pos_z,lidar_x,lidar_y,lidar_z\n1,2,3,4,5,6\n",
     "grid of heights": "ncols 3\nnrows 2\nxllcorner 0\nyllcorner 0\ncellsize 1\n1 2 3\n4 5 6\n",
+    "25 x 64 numbers are an image": ("1.5 " * 64 + "\n") * 25,
     "is a row number": "".join(f"{k} 1.5 2.5 {k * k}\n" for k in range(30)),
 }
 

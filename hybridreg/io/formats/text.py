@@ -12,6 +12,7 @@ from hybridreg.io.arrays import counts_up
 from hybridreg.io.column_names import Axes, axes_in, unit_said
 from hybridreg.io.faults import fault, shorten
 from hybridreg.io.formats.text_rows import parse_rows, text_lines
+from hybridreg.io.meaning.image_shapes import refuse_image
 from hybridreg.io.signatures import looks_binary
 
 _COMMENTS = ("#", "//", "%", ";")
@@ -56,6 +57,8 @@ def parse_text(data: bytes, name: str) -> NDArray[np.float64]:
     elif first and (named := _commented_names(lines[first - 1], delimiter)):
         axes = axes_in(named, name)
     rows = _counted(rows, name)
+    if rows and not named:
+        refuse_image(len(rows), len(rows[0].split(delimiter)), name)
     points = parse_rows(
         [row.replace(",", ".") for row in rows] if comma else rows, axes.columns, name, delimiter
     )
