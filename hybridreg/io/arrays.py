@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from hybridreg.io.column_names import axes_in
 from hybridreg.io.faults import fault
+from hybridreg.io.meaning.first_column import FEWEST, check_first_column
 from hybridreg.io.meaning.image_shapes import check_photo, refuse_image
 from hybridreg.io.record_fields import stack_axes
 
@@ -17,7 +18,6 @@ Array = NDArray[np.float64]
 
 # Fields of one array that hold all three coordinates.
 TOGETHER = ("xyz", "points", "point", "positions", "position", "pos", "coords", "coord", "coordinates")
-FEWEST = 20  # points of a cloud, at least
 # So 3 to 6 rows of at least that length are channels: x, y, z, w (or intensity), ring, time.
 _MOST_CHANNELS = 6
 # Sensors have eight rows or more; a stack with fewer is more likely several clouds.
@@ -26,7 +26,7 @@ _FEWEST_ROWS = 8
 _LAS_ONLY = ("bit_fields", "raw_classification", "point_source_id")
 
 
-def array_points(array: NDArray[Any], name: str, *, batched: bool = False) -> Array:
+def array_points(array: NDArray[Any], name: str, *, batched: bool = False, cure: str = "") -> Array:
     """x, y and z, shape (N, 3), a copy; masked values become NaN.
 
     Parameters
@@ -37,6 +37,8 @@ def array_points(array: NDArray[Any], name: str, *, batched: bool = False) -> Ar
         What error messages call the cloud.
     batched : bool
         Whether a third dimension means several clouds (torch), not rows of one.
+    cure : str
+        How to leave out a first column that is no x; empty for an array, which is told its slice.
 
     Raises
     ------
@@ -48,19 +50,8 @@ def array_points(array: NDArray[Any], name: str, *, batched: bool = False) -> Ar
     if array.dtype.kind not in "fiu":
         raise fault(name, f"coordinates must be numbers, got dtype {_short(array)}", _as_numbers(array))
     rows = _rows(array, name, batched)
-    if rows.shape[1] > 3 and counts_up(rows[:, 0]):
-        raise fault(
-            name, "its first column is a row number, not a coordinate", "leave it out: give columns 2 to 4"
-        )
+    check_first_column(rows, name, cure or f"leave it out: give columns 2 to 4, {_without_first(array)}")
     return _numbers(rows[:, :3])
-
-
-def counts_up(column: NDArray[Any]) -> bool:
-    """Whether a column holds row numbers: at least 20 values, each one more than the last."""
-    # As floats: the difference of unsigned numbers overflows.
-    if len(column) < FEWEST or float(column[1]) - float(column[0]) != 1.0:
-        return False
-    return bool(np.all(np.diff(column.astype(np.float64)) == 1.0))
 
 
 def _rows(array: NDArray[Any], name: str, batched: bool) -> NDArray[Any]:
@@ -89,6 +80,11 @@ def _rows(array: NDArray[Any], name: str, batched: bool) -> NDArray[Any]:
     if np.squeeze(array).ndim == 2:
         refuse_image(*np.squeeze(array).shape, name)
     raise fault(name, f"expected an array of shape (N, 3), got {shape}", _shape_cure(array, batched))
+
+
+def _without_first(array: NDArray[Any]) -> str:
+    channels = array.shape[0] in range(3, _MOST_CHANNELS + 1) and array.shape[-1] > _MOST_CHANNELS
+    return "x[1:4]" if channels else "x[..., 1:4]"
 
 
 def _shape_cure(array: NDArray[Any], batched: bool) -> str:

@@ -53,9 +53,9 @@ def points(x: Any, names: list[Any], name: str) -> Array:
     if unnamed:
         refuse_image(len(_numbers(x, 0, names, name)), len(names), name)
     if unnamed and find_axes(told, name) is None:
-        # Positions again: the first may count the rows.
-        columns = [_numbers(x, k, names, name) for k in range(min(4, len(names)))]
-        return array_points(np.column_stack(columns), name)
+        # Positions again: the first may be none.
+        columns = [_numbers(x, k, names, name) for k in range(min(6, len(names)))]
+        return array_points(np.column_stack(columns), name, cure="call the columns of x, y and z so")
     axes = axes_in(told, name)
     columns = [_numbers(x, k, names, name) for k in axes.columns]
     if len({len(column) for column in columns}) > 1:

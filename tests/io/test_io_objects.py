@@ -144,6 +144,61 @@ def test_features_of_each_point_are_no_image() -> None:
     assert len(PointCloud.of((points * 100 + 1000).astype("u2"))) == 5000
 
 
+R = np.linalg.norm(P, axis=1)
+
+
+def test_a_range_before_the_points_is_no_coordinate() -> None:
+    for table in (np.c_[R, P], np.c_[R, P, R].astype("f4")):
+        assert "length of the next three" in refused(table)
+        assert "x[..., 1:4]" in refused(table)
+        same(table[..., 1:4], table[..., 1:4].astype(float))
+    missing = np.c_[R, P, R].T.reshape(5, 6, 10).copy()
+    missing[:, ::3] = -1
+    assert "x[1:4]" in refused(missing)
+
+
+FIRST = {
+    "0 in each row, like an index in a batch": np.zeros(60),
+    "2 whole numbers, like a ring": np.repeat([0, 1], 30),
+    "16 whole numbers, like a ring": np.arange(60) % 16,
+    "1.6e.09, like a time": 1.6e9 + np.random.default_rng(3).uniform(0, 0.1, 60),
+    "rises from row to row, like a time": np.linspace(0, 0.1, 60),
+    "rises from row to row": np.arange(60) * 10,
+    "rises .* a number of the row": np.cumsum(np.random.default_rng(3).integers(1, 90, 60)),
+}
+
+
+@pytest.mark.parametrize("words", FIRST)
+def test_a_doubtful_first_column_is_told(words: str) -> None:
+    pd = pytest.importorskip("pandas")
+    table = np.c_[FIRST[words], P]
+    with pytest.warns(
+        UserWarning, match=rf"target: its first column was read as x, and .*{words}.*x\[\.\.\., 1:4\]"
+    ):
+        PointCloud.of(table, name="target")
+    with pytest.warns(UserWarning, match="call the columns of x, y and z so"):
+        PointCloud.of(pd.DataFrame(table))
+
+
+def test_normals_before_the_points_are_told() -> None:
+    with pytest.warns(UserWarning, match=r"first three columns .* length 1 in each row"):
+        PointCloud.of(np.c_[P / R[:, None], P])
+
+
+@pytest.mark.filterwarnings("error")
+def test_first_columns_that_may_well_be_x() -> None:
+    x, y = (each.ravel() for each in np.meshgrid(np.arange(40.0), np.arange(30.0), indexing="ij"))
+    heights = np.c_[x, y, np.sin(x) + np.cos(y), x % 5]
+    for table in (heights, heights[:, [1, 0, 2, 3]], heights * [0.5, 0.5, 1, 1]):
+        same(table, table[:, :3])
+    sorted_ = np.unique(np.c_[P, R], axis=0)
+    same(sorted_, sorted_[:, :3])
+    same(np.c_[P, P / R[:, None]])
+    same(np.c_[0 * R, P[:, 1:], R / R.max()], P * [0, 1, 1])  # a flat scan with an intensity
+    cells = np.unique(np.floor(P * 4), axis=0)
+    same(np.c_[cells, cells[:, 0] * 0], cells)
+
+
 def test_tensors() -> None:
     torch = pytest.importorskip("torch")
     same(torch.tensor(P, requires_grad=True))

@@ -144,3 +144,18 @@ def test_refused_heads(message):
     with pytest.raises(ValueError, match=r"a\.txt: ") as caught:
         parse_text(REFUSED_HEADS[message].encode(), "a.txt")
     assert message in str(caught.value)
+
+
+def test_a_range_first_is_refused_and_a_ring_first_is_told():
+    points = np.random.default_rng(0).normal(size=(60, 3)) * [9, 9, 1]
+    ranges = np.linalg.norm(points, axis=1)
+    with pytest.raises(ValueError, match=r"a\.csv: .*length of the next three.*id x y z"):
+        parse_text(
+            "".join(f"{r},{x},{y},{z}\n" for r, (x, y, z) in zip(ranges, points, strict=True)).encode(),
+            "a.csv",
+        )
+    rows = "".join(f"{k % 16};{x};{y};{z};car\n" for k, (x, y, z) in enumerate(points))
+    with pytest.warns(UserWarning, match=r"a\.csv: .*16 whole numbers, like a ring.*id x y z"):
+        parse_text(rows.encode(), "a.csv")
+    named = parse_text(f"id;x;y;z;kind\n{rows}".encode(), "a.csv")
+    np.testing.assert_array_equal(named, points)

@@ -8,10 +8,10 @@ import re
 import numpy as np
 from numpy.typing import NDArray
 
-from hybridreg.io.arrays import counts_up
 from hybridreg.io.column_names import Axes, axes_in, unit_said
 from hybridreg.io.faults import fault, shorten
 from hybridreg.io.formats.text_rows import parse_rows, text_lines
+from hybridreg.io.meaning.first_column import check_first_column, looked_at, refuse_row_numbers
 from hybridreg.io.meaning.image_shapes import refuse_image
 from hybridreg.io.signatures import looks_binary
 
@@ -59,13 +59,24 @@ def parse_text(data: bytes, name: str) -> NDArray[np.float64]:
     rows = _counted(rows, name)
     if rows and not named:
         refuse_image(len(rows), len(rows[0].split(delimiter)), name)
-    points = parse_rows(
-        [row.replace(",", ".") for row in rows] if comma else rows, axes.columns, name, delimiter
-    )
-    if not named and counts_up(points[:, 0]) and len(rows[0].split(delimiter)) > 3:
-        cure = "name the columns in a first row, such as: id x y z"
-        raise fault(name, "its first column is a row number, not a coordinate", cure)
+    rows = [row.replace(",", ".") for row in rows] if comma else rows
+    points = parse_rows(rows, axes.columns, name, delimiter)
+    if not named:
+        _check_first(points, rows, delimiter, name)
     return _in_metres(points, axes, lines[:first], name)
+
+
+def _check_first(points: NDArray[np.float64], rows: list[str], delimiter: str | None, name: str) -> None:
+    """Whether the first column of rows without names, which became x of `points` (N, 3), is one."""
+    words = rows[0].split(delimiter) if rows else []
+    width = next((k for k, word in enumerate(words) if not _is_number(word)), len(words))
+    if width <= 3:
+        return
+    cure = "name the columns in a first row, such as: id x y z"
+    refuse_row_numbers(points[:, 0], name, cure)
+    some = [rows[k].split(delimiter)[:width] for k in looked_at(len(rows))]
+    whole = [row for row in some if len(row) == width and all(map(_is_number, row))]
+    check_first_column(np.array(whole, dtype=np.float64).reshape(-1, width), name, cure)
 
 
 def _in_metres(
