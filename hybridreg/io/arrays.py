@@ -77,8 +77,9 @@ def _rows(array: NDArray[Any], name: str, batched: bool) -> NDArray[Any]:
             raise fault(name, f"expected an array of shape (N, 3), got {shape}, {shape[0]} points", cure)
         refuse_image(shape[0], shape[1], name)
         return array
-    if np.squeeze(array).ndim == 2:
-        refuse_image(*np.squeeze(array).shape, name)
+    flat = np.squeeze(array)
+    if flat.ndim == 2:
+        refuse_image(flat.shape[0], flat.shape[1], name)
     raise fault(name, f"expected an array of shape (N, 3), got {shape}", _shape_cure(array, batched))
 
 

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from hybridreg.io.column_names import Axes, axes_in, unit_said
 from hybridreg.io.faults import fault, shorten
+from hybridreg.io.formats.text_names import axes_in_comments, is_number, names_in
 from hybridreg.io.formats.text_rows import parse_rows, text_lines
 from hybridreg.io.meaning.first_column import check_first_column, looked_at, refuse_row_numbers
 from hybridreg.io.meaning.image_shapes import refuse_image
@@ -23,8 +24,8 @@ _POSITION = Axes((0, 1, 2))
 def parse_text(data: bytes, name: str) -> NDArray[np.float64]:
     """Read x, y and z of text rows separated by spaces, tabs, commas or semicolons; shape (N, 3), metres.
 
-    Lines that begin with `#`, `//`, `%` or `;` are comments. A first row of names (CloudCompare puts it
-    behind a comment mark) tells which columns are x, y and z, and perhaps their unit; otherwise the first three are. A
+    Lines that begin with `#`, `//`, `%` or `;` are comments. A first row of names, or a comment of names before it,
+    tells which columns are x, y and z, and perhaps their unit; otherwise the first three are. A
     first row of one whole number (PTS, XYZ) is the number of points and must be right. A comma is a decimal point
     where something else separates the numbers.
 
@@ -49,19 +50,16 @@ def parse_text(data: bytes, name: str) -> NDArray[np.float64]:
     delimiter, comma = _delimiter(
         rows[len(rows) // 2]
     )  # not the first, which may be names, nor a cut-off last
-    axes = _POSITION
-    named = _names(rows[0], delimiter)
-    if named:
-        axes = axes_in(named, name)
-        rows = rows[1:]
-    elif first and (named := _commented_names(lines[first - 1], delimiter)):
-        axes = axes_in(named, name)
-    rows = _counted(rows, name)
-    if rows and not named:
-        refuse_image(len(rows), len(rows[0].split(delimiter)), name)
+    names = names_in(rows[0], delimiter)
+    rows = _counted(rows[1:] if names else rows, name)
+    width = len(rows[0].split(delimiter)) if rows else 0
+    named = axes_in(names, name) if names else axes_in_comments(lines[:first], delimiter, width, name)
+    if named is None:
+        refuse_image(len(rows), width, name)
+    axes = named or _POSITION
     rows = [row.replace(",", ".") for row in rows] if comma else rows
     points = parse_rows(rows, axes.columns, name, delimiter)
-    if not named:
+    if named is None:
         _check_first(points, rows, delimiter, name)
     return _in_metres(points, axes, lines[:first], name)
 
@@ -69,13 +67,13 @@ def parse_text(data: bytes, name: str) -> NDArray[np.float64]:
 def _check_first(points: NDArray[np.float64], rows: list[str], delimiter: str | None, name: str) -> None:
     """Whether the first column of rows without names, which became x of `points` (N, 3), is one."""
     words = rows[0].split(delimiter) if rows else []
-    width = next((k for k, word in enumerate(words) if not _is_number(word)), len(words))
+    width = next((k for k, word in enumerate(words) if not is_number(word)), len(words))
     if width <= 3:
         return
     cure = "name the columns in a first row, such as: id x y z"
     refuse_row_numbers(points[:, 0], name, cure)
     some = [rows[k].split(delimiter)[:width] for k in looked_at(len(rows))]
-    whole = [row for row in some if len(row) == width and all(map(_is_number, row))]
+    whole = [row for row in some if len(row) == width and all(map(is_number, row))]
     check_first_column(np.array(whole, dtype=np.float64).reshape(-1, width), name, cure)
 
 
@@ -96,32 +94,6 @@ def _delimiter(row: str) -> tuple[str | None, bool]:
     if "," in row and len(words) >= 3 and all(_DECIMAL_COMMA.fullmatch(word.strip()) for word in words[:3]):
         return ("\t" if "\t" in row else None), True
     return next((mark for mark in (",", "\t") if mark in row), None), False
-
-
-def _names(row: str, delimiter: str | None) -> list[str]:
-    """The names in a row of names, with their units and without quotes; none if it is a row of numbers."""
-    if delimiter is None:  # a unit belongs to the name before it
-        row = re.sub(r"\s+(?=[\[(])", "", row)
-    words = [word.strip().strip("\"'").strip() for word in row.split(delimiter)]
-    return [] if any(_is_number(word.replace(",", ".")) for word in words) else words
-
-
-def _commented_names(line: str, delimiter: str | None) -> list[str]:
-    # Most comments are prose: only one that has an x, a y and a z is taken for the names of the columns.
-    words = line.lstrip("#/%; ")
-    for mark in (delimiter, None):
-        names = _names(words, mark)
-        if {"x", "y", "z"} <= {re.sub(r"\s*[\[(].*", "", label).lower() for label in names}:
-            return names
-    return []
-
-
-def _is_number(word: str) -> bool:
-    try:
-        float(word)
-    except ValueError:
-        return False
-    return True
 
 
 def _counted(rows: list[str], name: str) -> list[str]:
