@@ -12,6 +12,7 @@ from hybridreg.io.column_names import axes_in
 from hybridreg.io.faults import fault
 from hybridreg.io.meaning.first_column import FEWEST, check_first_column
 from hybridreg.io.meaning.image_shapes import check_photo, refuse_image
+from hybridreg.io.meaning.length_units import in_metres
 from hybridreg.io.record_fields import stack_axes
 
 Array = NDArray[np.float64]
@@ -112,9 +113,7 @@ def _of_fields(array: NDArray[Any], name: str) -> Array:
     columns = [np.ravel(array[names[column]]) for column in axes.columns]
     if any(column.dtype.kind not in "fiu" or len(column) != array.size for column in columns):
         raise fault(name, f"its x, y and z are {_short(array)}, not one number each", _as_numbers(columns[0]))
-    axes.tell(name)
-    points = stack_axes(*(_numbers(column) for column in columns))
-    return points if axes.metres == 1.0 else points * axes.metres
+    return in_metres(stack_axes(*(_numbers(column) for column in columns)), axes.metres, name)
 
 
 def _numbers(values: NDArray[Any]) -> Array:

@@ -158,7 +158,7 @@ def selection_for(path: str | os.PathLike[str], choice: Mapping[str, Any]) -> Se
 
 
 def read_viewpoint(path: str | os.PathLike[str]) -> NDArray[np.float64] | None:
-    """Where the sensor stood, (3,) in the file's own frame and unit, as a `.pcd` file may give it; otherwise None.
+    """Where the sensor stood, (3,) among the points that `read_points` gives, as a `.pcd` file may tell; else None.
 
     Raises
     ------

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from hybridreg.io import tables
 from hybridreg.io.arrays import TOGETHER, array_points
 from hybridreg.io.formats.las_units import in_metres
+from hybridreg.io.meaning import length_units
 from hybridreg.io.recorded import ros_messages
 
 Array = NDArray[np.float64]
@@ -32,7 +33,10 @@ def points_of(x: Any, name: str, depth: int = 0) -> Array:
         Nothing there holds points, or it is a mesh and not a cloud; the message says what to pass instead.
     """
     if isinstance(x, np.ndarray):
-        return _from_array(x, name)
+        plain = (
+            np.asarray(x) if hasattr(x, "unit") else x
+        )  # astropy's quantities compare with their like alone
+        return length_units.in_metres(_from_array(plain, name), length_units.unit_given(x, name), name)
     if hasattr(x, "detach") and hasattr(x, "cpu"):
         return _from_torch(x, name)
     if ros_messages.is_cloud(x):
@@ -52,14 +56,15 @@ def points_of(x: Any, name: str, depth: int = 0) -> Array:
         return in_metres(_from_array(np.asarray(x.xyz), name), x.header.vlrs, name)
     held = _held(x)
     if held is not None and depth < _DEEPEST:
-        return points_of(held, name, depth + 1)
+        return _held_points(held, x, name, depth)
     if all(hasattr(x, axis) for axis in "xyz"):  # laspy's records
         return tables.points({axis: getattr(x, axis) for axis in "xyz"}, list("xyz"), name)
     if isinstance(x, (list, tuple)) and x and not isinstance(x[0], (list, np.ndarray, int, float)):
         rows = _named_rows(x)
         if rows is not None:
             return points_of(rows, name, depth + 1)
-    return _from_array(_as_array(x, name), name)
+    points = _from_array(_as_array(x, name), name)
+    return length_units.in_metres(points, length_units.unit_given(x, name), name)
 
 
 def _from_array(array: NDArray[Any], name: str, batched: bool = False) -> Array:
@@ -89,11 +94,20 @@ def _from_table(x: Any, names: list[Any], name: str, depth: int) -> Array:
             (names[lowered.index(each)] for each in (*TOGETHER, "arr_0") if each in lowered), None
         )
         if together is not None:
-            return points_of(x[together], name, depth + 1)
+            return _held_points(x[together], x, name, depth)
     return tables.points(x, names, name)
 
 
+def _held_points(held: Any, x: Any, name: str, depth: int) -> Array:
+    points = points_of(held, name, depth + 1)
+    # What lies deepest knows best, and was read in metres.
+    said = None if length_units.unit_given(held, name) else length_units.unit_given(x, name)
+    return length_units.in_metres(points, said, name)
+
+
 def _held(x: Any) -> Any:
+    if hasattr(x, "magnitude") and hasattr(x, "units"):  # pint
+        return x.magnitude
     for attribute in _HOLD:
         held = getattr(x, attribute, None)
         held = held() if callable(held) else held  # small_gicp's points are a method

@@ -14,6 +14,7 @@ from hybridreg.io.arrays import array_points
 from hybridreg.io.column_names import axes_in, find_axes
 from hybridreg.io.faults import fault, shorten
 from hybridreg.io.meaning.image_shapes import refuse_image
+from hybridreg.io.meaning.length_units import in_metres, one_unit, unit_given
 from hybridreg.io.record_fields import stack_axes
 
 Array = NDArray[np.float64]
@@ -61,9 +62,17 @@ def points(x: Any, names: list[Any], name: str) -> Array:
     if len({len(column) for column in columns}) > 1:
         lengths = ", ".join(str(len(column)) for column in columns)
         raise fault(name, f"x, y and z have the lengths {lengths}", "give them equally long")
-    axes.tell(name)
-    found = stack_axes(*columns)
-    return found if axes.metres == 1.0 else found * axes.metres
+    metres = axes.metres if axes.metres != 1.0 else _unit(x, axes.columns, names, name)
+    return in_metres(stack_axes(*columns), metres, name)
+
+
+def _unit(x: Any, columns: tuple[int, int, int], names: list[Any], name: str) -> float | None:
+    """Metres of the unit that the columns say, or the table for all of them."""
+    if hasattr(x, "column") and hasattr(x, "schema"):
+        said = one_unit((unit_given(x.schema.field(k), name) for k in columns), name)
+        return unit_given(x.schema, name) if said is None else said
+    said = one_unit((unit_given(_column(x, k, names), name) for k in columns), name)
+    return unit_given(x, name) if said is None else said
 
 
 def _along(x: Any) -> Any:
@@ -77,6 +86,8 @@ def _along(x: Any) -> Any:
 
 
 def _column(x: Any, k: int, names: list[Any]) -> Any:
+    if hasattr(x, "colnames"):  # astropy, whose iloc is another
+        return x[names[k]]
     if hasattr(x, "iloc"):  # pandas, where two columns may have one name
         return x.iloc[:, k]
     if hasattr(x, "column") and hasattr(x, "schema"):
@@ -89,6 +100,7 @@ def _column(x: Any, k: int, names: list[Any]) -> Any:
 def _numbers(x: Any, k: int, names: list[Any], name: str) -> Array:
     """Column `k` as float64, (N,)."""
     values = _column(x, k, names)
+    values = values.magnitude if hasattr(values, "magnitude") and hasattr(values, "units") else values  # pint
     if hasattr(values, "detach"):
         values = values.detach().cpu()
     try:

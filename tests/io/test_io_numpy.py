@@ -152,6 +152,15 @@ def test_an_image_beside_the_cloud_is_no_second_candidate(cloud):
         parse_npz(npz(depth=depth), "a.npz")
 
 
+@pytest.mark.parametrize("key", ["unit", "units", "length_unit"])
+def test_a_unit_in_an_archive_is_believed_and_told(key, cloud):
+    for word in ("mm", b"mm", ["mm"]):
+        with pytest.warns(UserWarning, match=r"a\.npz: its own header says that its unit is 0\.001 m"):
+            points = parse_npz(npz(xyz=cloud, **{key: word}), "a.npz")
+        np.testing.assert_allclose(points, cloud / 1000)
+    np.testing.assert_array_equal(parse_npz(npz(xyz=cloud, **{key: np.arange(3)}), "a.npz"), cloud)
+
+
 def test_archives_without_a_cloud():
     stream = io.BytesIO()
     with zipfile.ZipFile(stream, "w") as archive:

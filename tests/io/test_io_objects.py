@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections import namedtuple
 from types import SimpleNamespace
 from typing import Any
@@ -142,6 +143,73 @@ def test_features_of_each_point_are_no_image() -> None:
     same(np.c_[points, np.ones((5000, 64))], points)
     same(np.c_[P, np.ones((60, 33))])
     assert len(PointCloud.of((points * 100 + 1000).astype("u2"))) == 5000
+
+
+def in_millimetres() -> dict[str, Any]:
+    """The same cloud in millimetres, as each package says so that is installed."""
+    mm, axes = P * 1000, dict(zip("xyz", (P * 1000).T, strict=True))
+    held: dict[str, Any] = {"dictionary": {**axes, "unit": "mm"}, "together": {"xyz": mm, "units": "mm"}}
+    held["attribute"] = SimpleNamespace(points=mm, units="millimeters")
+    with contextlib.suppress(ImportError):
+        import pandas as pd
+
+        held["pandas"] = pd.DataFrame(axes)
+        held["pandas"].attrs["units"] = "mm"
+    with contextlib.suppress(ImportError):
+        import xarray as xr
+
+        held["Dataset"] = xr.Dataset({k: ("n", v, {"units": "mm"}) for k, v in axes.items()})
+        held["DataArray"] = xr.DataArray(
+            mm, dims=("n", "axis"), coords={"axis": list("xyz")}, attrs={"units": "mm"}
+        )
+        held["DataArray without labels"] = xr.DataArray(mm, attrs={"units": "mm"})
+    with contextlib.suppress(ImportError):
+        import pyarrow as pa
+
+        fields = [pa.field(k, pa.float64(), metadata={"unit": "mm"}) for k in axes]
+        held["pyarrow"] = pa.table([pa.array(v) for v in axes.values()], schema=pa.schema(fields))
+    with contextlib.suppress(ImportError):
+        import trimesh
+
+        held["trimesh"] = trimesh.PointCloud(mm)
+        held["trimesh"].units = "mm"
+    with contextlib.suppress(ImportError):
+        from astropy import units
+        from astropy.coordinates import CartesianRepresentation
+        from astropy.table import QTable
+
+        held["Quantity"] = mm * units.mm
+        held["CartesianRepresentation"] = CartesianRepresentation(*mm.T * units.mm)
+        held["QTable"] = QTable({k: v * units.mm for k, v in axes.items()})
+    return held
+
+
+MILLIMETRES = in_millimetres()
+
+
+@pytest.mark.parametrize("kind", MILLIMETRES)
+def test_a_unit_in_the_data_is_believed_and_told_once(kind: str) -> None:
+    with pytest.warns(UserWarning, match=r"target: its own header says that its unit is 0\.001 m") as told:
+        cloud = PointCloud.of(MILLIMETRES[kind], name="target")
+    np.testing.assert_allclose(cloud.points, P)
+    assert len(told) == 1
+
+
+@pytest.mark.filterwarnings("error")
+def test_what_is_called_unit_and_is_none() -> None:
+    pd = pytest.importorskip("pandas")
+    same(pd.DataFrame(P, columns=list("xyz")).assign(unit="mm", units=1.0))
+    same({**dict(zip("xyz", P.T, strict=True)), "unit": P[:, 0]})
+    same(SimpleNamespace(points=P, units="m"))
+    same(SimpleNamespace(points=P, units=None))
+
+
+def test_angles_and_units_that_differ_are_refused() -> None:
+    assert "'degrees_north'" in refused({**dict(zip("xyz", P.T, strict=True)), "units": "degrees_north"})
+    xr = pytest.importorskip("xarray")
+    units = {"x": "mm", "y": "mm", "z": "m"}
+    mixed = xr.Dataset({k: ("n", v, {"units": units[k]}) for k, v in zip("xyz", P.T, strict=True)})
+    assert "differ: 0.001 m, 0.001 m, 1 m" in refused(mixed)
 
 
 R = np.linalg.norm(P, axis=1)

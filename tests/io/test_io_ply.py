@@ -183,3 +183,12 @@ def test_ascii_list_without_length():
     head = header("element vertex 1", "property list uchar int a", AXES.rstrip(), word="ascii")
     with pytest.raises(ValueError, match="no length"):
         parse_ply(head + b"-1 2 3 4 5\n", "a.ply")
+
+
+@pytest.mark.parametrize("keyword", ["comment", "obj_info"])
+def test_a_unit_in_a_comment_is_believed_and_told(keyword):
+    data = header(f"{keyword} unit: mm", "element vertex 1", *AXES.splitlines()) + struct.pack(
+        "<3f", 1500, 2000, 3000
+    )
+    with pytest.warns(UserWarning, match=r"a\.ply: its own header says that its unit is 0\.001 m"):
+        np.testing.assert_allclose(parse_ply(data, "a.ply"), [[1.5, 2, 3]])

@@ -101,6 +101,11 @@ UNITS = {
     "commented x_mm": "# x_mm y_mm z_mm\n# 3 points\n1500 2000 3000\n-4000 5250 6e6\n7000 8000 -9000\n",
     "first returns too": "# T,X1 (mm), Y1 (mm), Z1 (mm)\n1,1500,2000,3000\n1,-4000,5250,6e6\n1,7000,8000,-9000\n",
     "unit: mm": "# unit: mm\n1500 2000 3000\n-4000 5250 6e6\n7000 8000 -9000\n",
+    "length_unit": "# length_unit: mm\n1500 2000 3000\n-4000 5250 6e6\n7000 8000 -9000\n",
+    "coordinates in mm": "# all coordinates in mm\n1500 2000 3000\n-4000 5250 6e6\n7000 8000 -9000\n",
+    "given in millimetres": "# Coordinates given in millimetres.\n1500 2000 3000\n-4000 5250 6e6\n7000 8000 -9000\n",
+    "[mm]": "# [mm]\n1500 2000 3000\n-4000 5250 6e6\n7000 8000 -9000\n",
+    "LOCAL_CS": '# LOCAL_CS["L (mm)",UNIT["millimetre",0.001]]\n1500 2000 3000\n-4000 5250 6e6\n7000 8000 -9000\n',
     "units are centimetres": "// Units are centimetres\n150 200 300\n-400 525 6e5\n700 800 -900\n",
 }
 
@@ -117,6 +122,37 @@ def test_feet(feet, metres):
     with pytest.warns(UserWarning, match=r"0\.3048"):
         points = parse_text(f"x ({feet}),y ({feet}),z ({feet})\n1,2,3\n4,5,6\n".encode(), "a.csv")
     np.testing.assert_allclose(points, np.array([[1, 2, 3], [4, 5, 6]]) * metres)
+
+
+def test_feet_and_inches_in_a_comment():
+    for comment, metres in (
+        ("Units: US survey feet", 1200 / 3937),
+        ("unit: inch", 0.0254),
+        ("unit: in", 0.0254),
+    ):
+        with pytest.warns(UserWarning, match="its unit is 0"):
+            points = parse_text(f"# {comment}\n1 2 3\n4 5 6\n".encode(), "a.txt")
+        np.testing.assert_allclose(points, np.array([[1, 2, 3], [4, 5, 6]]) * metres)
+
+
+def test_a_scale_is_told():
+    with pytest.warns(UserWarning, match=r"a\.txt: its header says 'scale: 0\.001', which was not applied"):
+        np.testing.assert_array_equal(parse_text(b"# scale: 0.001\n1 2 3\n", "a.txt"), [[1, 2, 3]])
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize(
+    "comment",
+    [
+        "angle_unit: deg",
+        "range unit: mm",
+        "unit 7",
+        "scale: 1.0",
+        'PROJCS["U",GEOGCS["W",UNIT["degree",0.0]],UNIT["metre",1]]',
+    ],
+)
+def test_comments_that_give_no_other_unit(comment):
+    np.testing.assert_array_equal(parse_text(f"# {comment}\n1 2 3\n".encode(), "a.txt"), [[1, 2, 3]])
 
 
 HEADS = {
@@ -139,6 +175,8 @@ def test_heads_of_tools(style):
 
 REFUSED_HEADS = {
     "in 'deg'": "x (deg),y (deg),z (m)\n1,2,3\n",
+    "is 'degrees'": "# units: degrees\n7.1 50.7 100\n",
+    "is 'degree'": '# GEOGCS["WGS 84",UNIT["degree",0.0174]]\n7.1 50.7 100\n',
     "differ: mm, mm, m": "x (mm),y (mm),z (m)\n1,2,3\n",
     "longitudes and latitudes": "lon,lat,h\n7.1,50.7,100\n",
     "several columns that could be": "pos_x,pos_y,pos_z,lidar_x,lidar_y,lidar_z\n1,2,3,4,5,6\n",

@@ -13,7 +13,9 @@ from hybridreg.io.arrays import array_points
 from hybridreg.io.faults import fault, foreign_parser
 from hybridreg.io.formats.npy import array_of_npy, npy_header
 from hybridreg.io.meaning.image_shapes import is_image
+from hybridreg.io.meaning.length_units import in_metres, unit_given
 
+_UNITS = ("unit", "units", "length_unit")
 _KEYS = ("xyz", "points", "arr_0")
 _MODEST = 2**28  # bytes that are unpacked in any case
 # Coordinates hardly compress (up to 20 times on a coarse grid); noise of zeros compresses a thousandfold.
@@ -30,8 +32,18 @@ def parse_npz(data: bytes, name: str) -> NDArray[np.float64]:
         _refuse_bomb(archive.getinfo(f"{key}.npy"), f"{name} (array {key!r})")
         with foreign_parser(name, "a zip archive of arrays"):
             content = archive.read(f"{key}.npy")
+            words = {
+                each: archive.read(f"{each}.npy") for each in _UNITS if f"{each}.npy" in archive.namelist()
+            }
     label = f"{name} (array {key!r})"
-    return array_points(array_of_npy(content, label), label)
+    points = array_points(array_of_npy(content, label), label)
+    return in_metres(points, unit_given({each: _text(words[each], name) for each in words}, name), name)
+
+
+def _text(content: bytes, name: str) -> str:
+    # A word is kept as an array of one; an array of numbers that is called so says nothing.
+    array = array_of_npy(content, name) if npy_header(content, name)[2].kind in "US" else np.empty(0)
+    return str(array.astype("U").item()) if array.size == 1 else ""
 
 
 def _refuse_bomb(member: zipfile.ZipInfo, label: str) -> None:

@@ -8,12 +8,13 @@ import re
 import numpy as np
 from numpy.typing import NDArray
 
-from hybridreg.io.column_names import Axes, axes_in, unit_said
+from hybridreg.io.column_names import Axes, axes_in
 from hybridreg.io.faults import fault, shorten
 from hybridreg.io.formats.text_names import axes_in_comments, is_number, names_in
 from hybridreg.io.formats.text_rows import parse_rows, text_lines
 from hybridreg.io.meaning.first_column import check_first_column, looked_at, refuse_row_numbers
 from hybridreg.io.meaning.image_shapes import refuse_image
+from hybridreg.io.meaning.length_units import as_commented, in_metres
 from hybridreg.io.signatures import looks_binary
 
 _COMMENTS = ("#", "//", "%", ";")
@@ -61,7 +62,9 @@ def parse_text(data: bytes, name: str) -> NDArray[np.float64]:
     points = parse_rows(rows, axes.columns, name, delimiter)
     if named is None:
         _check_first(points, rows, delimiter, name)
-    return _in_metres(points, axes, lines[:first], name)
+    if axes.metres != 1.0:
+        return in_metres(points, axes.metres, name)
+    return as_commented(points, lines[:first], name)
 
 
 def _check_first(points: NDArray[np.float64], rows: list[str], delimiter: str | None, name: str) -> None:
@@ -75,15 +78,6 @@ def _check_first(points: NDArray[np.float64], rows: list[str], delimiter: str | 
     some = [rows[k].split(delimiter)[:width] for k in looked_at(len(rows))]
     whole = [row for row in some if len(row) == width and all(map(is_number, row))]
     check_first_column(np.array(whole, dtype=np.float64).reshape(-1, width), name, cure)
-
-
-def _in_metres(
-    points: NDArray[np.float64], axes: Axes, comments: list[str], name: str
-) -> NDArray[np.float64]:
-    said = next((metres for line in comments if (metres := unit_said(line)) != 1.0), 1.0)
-    axes = axes._replace(metres=said) if axes.metres == 1.0 else axes
-    axes.tell(name)
-    return points if axes.metres == 1.0 else points * axes.metres
 
 
 def _delimiter(row: str) -> tuple[str | None, bool]:
