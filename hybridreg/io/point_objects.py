@@ -180,6 +180,9 @@ def _as_array(x: Any, name: str) -> NDArray[Any]:
     if isinstance(x, (bytes, bytearray)):
         _refuse(x, name, "bytes have no type; pass numpy.frombuffer(x, dtype).reshape(-1, 3)")
     array = np.ma.asarray(x) if np.ma.isMaskedArray(x) else np.asarray(x)
+    if isinstance(x, (list, tuple)) and any(np.ma.isMaskedArray(each) for each in x):
+        # numpy leaves the masks out
+        array = np.ma.array(array, mask=[np.ma.getmaskarray(each) for each in x])
     if array.ndim == 0 and array.dtype.kind in "OUS":
         read = callable(getattr(x, "read", None))
         _refuse(x, name, "pass what its read() returns" if read else _CURE)

@@ -78,6 +78,8 @@ def test_fill_values_are_never_points(fill: float) -> None:
     assert "20 of 60 points" in refused(masked)
     kept = PointCloud.of(masked, nonfinite="drop")
     np.testing.assert_array_equal(kept.points, P[~mask.any(axis=1)])
+    for several in (list(masked), tuple(masked.T), [*masked[:59], P[59]]):
+        assert PointCloud.of(several, nonfinite="drop").dropped == 20
     whole = np.ma.masked_array((P * 100).astype(int), mask)
     assert PointCloud.of(whole, nonfinite="drop").dropped == 20
     rows = np.ma.masked_array(record(("x", "f8"), ("y", "f8"), ("z", "f8")), mask[:, 1])

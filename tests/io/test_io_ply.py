@@ -192,3 +192,12 @@ def test_a_unit_in_a_comment_is_believed_and_told(keyword):
     )
     with pytest.warns(UserWarning, match=r"a\.ply: its own header says that its unit is 0\.001 m"):
         np.testing.assert_allclose(parse_ply(data, "a.ply"), [[1.5, 2, 3]])
+
+
+def test_two_elements_of_vertices_are_refused():
+    axes = AXES.splitlines()
+    data = header("element vertex 1", *axes, "element Vertex 2", *axes) + struct.pack("<9f", *range(9))
+    with pytest.raises(
+        ValueError, match=r"a\.ply: has 2 elements 'vertex', of 1 and 2 points; export them as one"
+    ):
+        parse_ply(data, "a.ply")

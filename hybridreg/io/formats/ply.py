@@ -44,9 +44,12 @@ def _points(data: bytes, header: PlyHeader, name: str) -> NDArray[np.float64]:
 
 
 def _split_at_vertex(header: PlyHeader, name: str) -> tuple[tuple[Element, ...], Element]:
-    for index, element in enumerate(header.elements):
-        if element.name.lower() == "vertex":
-            return header.elements[:index], element
+    places = [k for k, element in enumerate(header.elements) if element.name.lower() == "vertex"]
+    if len(places) > 1:
+        counts = " and ".join(str(header.elements[k].count) for k in places[:5])
+        raise fault(name, f"has {len(places)} elements 'vertex', of {counts} points", "export them as one")
+    if places:
+        return header.elements[: places[0]], header.elements[places[0]]
     names = ", ".join(element.name for element in header.elements[:10]) or "nothing"
     raise fault(name, f"has no element 'vertex', only {names}", "export the file with its vertices")
 
