@@ -16,6 +16,7 @@ from hybridreg.io.coordinate_systems.las_extended import records_of_header
 from hybridreg.io.coordinate_systems.las_units import in_metres
 from hybridreg.io.formats.las_withheld import without_withheld
 from hybridreg.io.list_columns import listed_points
+from hybridreg.io.meaning import length_units
 from hybridreg.io.recorded import ros_messages, vtk_objects
 
 Array = NDArray[np.float64]
@@ -35,7 +36,10 @@ def points_of(x: Any, name: str, depth: int = 0) -> Array:
         Nothing there holds points, or it is a mesh and not a cloud; the message says what to pass instead.
     """
     if isinstance(x, np.ndarray):
-        return _from_array(x, name)
+        plain = (
+            np.asarray(x) if hasattr(x, "unit") else x
+        )  # astropy's quantities compare with their like alone
+        return length_units.in_metres(_from_array(plain, name), length_units.unit_given(x, name), name)
     if hasattr(x, "detach") and hasattr(x, "cpu"):
         return _from_torch(x, name)
     if ros_messages.is_cloud(x):
@@ -47,6 +51,7 @@ def points_of(x: Any, name: str, depth: int = 0) -> Array:
             x.point["positions"].cpu().numpy() if "positions" in x.point else np.empty((0, 3)), name
         )
     names = tables.labels(x)
+    _refuse_grid(x, names, name)
     if names is not None:
         return _from_table(x, names, name, depth)
     if vtk_objects.is_vtk(x):
@@ -60,7 +65,7 @@ def points_of(x: Any, name: str, depth: int = 0) -> Array:
         return in_metres(points, records_of_header(x.header, name), name)
     held = _held(x)
     if held is not None and depth < _DEEPEST:
-        return points_of(held, name, depth + 1)
+        return _held_points(held, x, name, depth)
     if all(hasattr(x, axis) for axis in "xyz"):  # laspy's records
         points = tables.points({axis: getattr(x, axis) for axis in "xyz"}, list("xyz"), name)
         return without_withheld(points, getattr(x, "withheld", None), name)
@@ -68,7 +73,8 @@ def points_of(x: Any, name: str, depth: int = 0) -> Array:
         rows = _named_rows(x)
         if rows is not None:
             return points_of(rows, name, depth + 1)
-    return _from_array(_as_array(x, name), name)
+    points = _from_array(_as_array(x, name), name)
+    return length_units.in_metres(points, length_units.unit_given(x, name), name)
 
 
 def _from_array(array: NDArray[Any], name: str, batched: bool = False) -> Array:
@@ -98,7 +104,7 @@ def _from_table(x: Any, names: list[Any], name: str, depth: int) -> Array:
             (names[lowered.index(each)] for each in (*TOGETHER, "arr_0") if each in lowered), None
         )
         if together is not None:
-            return points_of(x[together], name, depth + 1)
+            return _held_points(x[together], x, name, depth)
     listed = None if isinstance(x, Mapping) else listed_points(x, names, name)
     if listed is not None:
         return _from_array(listed, name)
@@ -122,7 +128,16 @@ def _clouds_of_scene(x: Any) -> Array | None:
     return np.vstack([np.asarray(part.vertices, dtype=np.float64) for part in x.dump()])
 
 
+def _held_points(held: Any, x: Any, name: str, depth: int) -> Array:
+    points = points_of(held, name, depth + 1)
+    # What lies deepest knows best, and was read in metres.
+    said = None if length_units.unit_given(held, name) else length_units.unit_given(x, name)
+    return length_units.in_metres(points, said, name)
+
+
 def _held(x: Any) -> Any:
+    if hasattr(x, "magnitude") and hasattr(x, "units"):  # pint
+        return x.magnitude
     for attribute in _HOLD:
         held = getattr(x, attribute, None)
         held = held() if callable(held) else held  # small_gicp's points are a method
@@ -154,6 +169,19 @@ def _named_rows(rows: Any) -> Any:
     return None
 
 
+def _refuse_grid(x: Any, names: list[Any] | None, name: str) -> None:
+    # xarray's: heights or ranges over the dimensions x and y, which are their coordinates.
+    flat = {str(each).lower() for each in getattr(x, "dims", ())}
+    if (
+        not {"x", "y"} <= flat
+        or not hasattr(x, "to_dataframe")
+        or {"x", "y", "z"} <= {*map(str, names or ())}
+    ):
+        return
+    call = "to_dataframe()" if hasattr(x, "data_vars") else 'to_dataframe("z")'
+    _refuse(x, name, f"it is a grid over x and y, not points; if it holds heights: x.{call}.reset_index()")
+
+
 def _refuse_mesh(x: Any, name: str) -> None:
     if hasattr(x, "geometry") and callable(getattr(x, "to_mesh", None)):
         _refuse(x, name, "a scene is not a cloud; sample its surfaces: x.to_mesh().sample(100_000)")
@@ -182,6 +210,9 @@ def _as_array(x: Any, name: str) -> NDArray[Any]:
     if isinstance(x, (bytes, bytearray)):
         _refuse(x, name, "bytes have no type; pass numpy.frombuffer(x, dtype).reshape(-1, 3)")
     array = np.ma.asarray(x) if np.ma.isMaskedArray(x) else np.asarray(x)
+    if isinstance(x, (list, tuple)) and any(np.ma.isMaskedArray(each) for each in x):
+        # numpy leaves the masks out
+        array = np.ma.array(array, mask=[np.ma.getmaskarray(each) for each in x])
     if array.ndim == 0 and array.dtype.kind in "OUS":
         read = callable(getattr(x, "read", None))
         _refuse(x, name, "pass what its read() returns" if read else _CURE)

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hybridreg.io.formats.pcd import parse_pcd
+from hybridreg.io.formats.pcd import parse_pcd, pcd_viewpoint
 
 CODES = {word: f"<{word.lower()}" for word in ("F4", "F8", "I1", "I2", "I4", "I8", "U1", "U2", "U4", "U8")}
 
@@ -171,3 +171,10 @@ def test_one_field_that_holds_all_three_coordinates(encoding):
         body = sizes(len(literal_lzf(raw)), len(raw)) + literal_lzf(raw)
     told = header(30, encoding, FIELDS="t xyz", SIZE="4 4", TYPE="F F", COUNT="1 3")
     np.testing.assert_array_equal(parse_pcd(told + body, "a.pcd"), points)
+
+
+def test_a_unit_in_a_comment_is_believed_and_told_for_the_viewpoint_too():
+    data = b"# unit: mm\n" + header(1, "ascii", VIEWPOINT="500 0 0 1 0 0 0") + b"1500 2000 3000\n"
+    with pytest.warns(UserWarning, match=r"a\.pcd: its own header says that its unit is 0\.001 m"):
+        np.testing.assert_allclose(parse_pcd(data, "a.pcd"), [[1.5, 2, 3]])
+    np.testing.assert_allclose(pcd_viewpoint(data, "a.pcd"), [0.5, 0, 0])

@@ -14,7 +14,10 @@ from hybridreg.io.arrays import FEWEST, array_points
 from hybridreg.io.column_names import find_axes
 from hybridreg.io.faults import fault, foreign_parser
 from hybridreg.io.formats.npy import array_of_npy, npy_header
+from hybridreg.io.meaning.image_shapes import is_image
+from hybridreg.io.meaning.length_units import in_metres, unit_given
 
+_UNITS = ("unit", "units", "length_unit")
 _KEYS = ("xyz", "points", "arr_0")
 _MODEST = 2**28  # bytes that are unpacked in any case
 # Coordinates hardly compress (up to 20 times on a coarse grid); noise of zeros compresses a thousandfold.
@@ -30,9 +33,21 @@ def parse_npz(data: bytes, name: str) -> NDArray[np.float64]:
     with archive:
         keys = _cloud_keys(archive, name)
         arrays = {key: _array(archive, key, name) for key in keys}
-    if len(keys) > 1:
-        return tables.points(arrays, keys, name)
-    return array_points(arrays[keys[0]], _label(name, keys[0]))
+        with foreign_parser(name, "a zip archive of arrays"):
+            words = {
+                each: archive.read(f"{each}.npy") for each in _UNITS if f"{each}.npy" in archive.namelist()
+            }
+    single = len(keys) == 1
+    points = (
+        array_points(arrays[keys[0]], _label(name, keys[0])) if single else tables.points(arrays, keys, name)
+    )
+    return in_metres(points, unit_given({each: _text(words[each], name) for each in words}, name), name)
+
+
+def _text(content: bytes, name: str) -> str:
+    # A word is kept as an array of one; an array of numbers that is called so says nothing.
+    array = array_of_npy(content, name) if npy_header(content, name)[2].kind in "US" else np.empty(0)
+    return str(array.astype("U").item()) if array.size == 1 else ""
 
 
 def _label(name: str, key: str) -> str:
@@ -61,7 +76,9 @@ def _cloud_keys(archive: zipfile.ZipFile, name: str) -> list[str]:
         if key in keys:
             return [key]
     shapes = {key: _shape(archive, key, name) for key in keys}
-    fitting = [key for key, shape in shapes.items() if len(shape) == 2 and shape[1] >= 3]
+    flat = [key for key, shape in shapes.items() if len(shape) == 2 and shape[1] >= 3]
+    # A depth image beside the cloud is no second cloud; alone it is refused as what it is.
+    fitting = [key for key in flat if not is_image(*shapes[key])] or flat
     # A matrix beside the columns of a cloud, such as its pose, is no cloud.
     none_fits = all(shapes[key][0] < FEWEST for key in fitting)
     axes = find_axes(keys, name) if none_fits else None

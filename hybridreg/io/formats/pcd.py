@@ -14,19 +14,25 @@ from hybridreg.io.faults import fault
 from hybridreg.io.formats.lzf import lzf_decompress
 from hybridreg.io.formats.pcd_header import PcdHeader, parse_pcd_header
 from hybridreg.io.formats.text_rows import parse_rows, promised_lines, text_lines
+from hybridreg.io.meaning.length_units import as_commented, unit_in
 from hybridreg.io.record_fields import XyzRecord, axis_columns, stack_axes
 
 _MOST_EXPANSION = 88  # three bytes of LZF make at most 264
 
 
 def parse_pcd(data: bytes, name: str) -> NDArray[np.float64]:
-    """Read x, y and z of a PCD file: ascii, binary or binary_compressed; shape (N, 3).
+    """Read x, y and z of a PCD file: ascii, binary or binary_compressed; shape (N, 3), metres where a comment gives
+    another unit.
 
     The points stay in the frame in which they are stored; VIEWPOINT, the sensor's position in it, is read by
     `pcd_viewpoint`. An organised cloud keeps its
     rows in order, empty pixels as NaN. Source: the Point Cloud Library's description of PCD 0.7.
     """
     header = parse_pcd_header(data, name)
+    return as_commented(_points(data, header, name), header.comments, name)
+
+
+def _points(data: bytes, header: PcdHeader, name: str) -> NDArray[np.float64]:
     together = _together(header)
     if together is not None and header.encoding == "binary_compressed":
         return _compressed_together(data, header, together, name)
@@ -61,9 +67,11 @@ def _apart(header: PcdHeader, k: int) -> PcdHeader:
 
 
 def pcd_viewpoint(data: bytes, name: str) -> NDArray[np.float64] | None:
-    """Where the sensor stood, (3,) in the frame of the points; None where the header gives only the origin."""
-    place = parse_pcd_header(data, name).viewpoint
-    return None if place is None else np.array(place)
+    """Where the sensor stood, (3,) among the points of `parse_pcd`; None where the header gives only the origin."""
+    header = parse_pcd_header(data, name)
+    if header.viewpoint is None:
+        return None
+    return np.array(header.viewpoint) * (unit_in(header.comments, name) or 1.0)
 
 
 def _ascii_points(

@@ -47,6 +47,7 @@ class PlyHeader:
     order: str  # "<" or ">", empty for ascii
     elements: tuple[Element, ...]
     body: int
+    comments: tuple[str, ...] = ()
 
 
 def parse_ply_header(data: bytes, name: str) -> PlyHeader:
@@ -57,6 +58,7 @@ def parse_ply_header(data: bytes, name: str) -> PlyHeader:
     order = ""
     seen_format = False
     elements: list[Element] = []
+    comments: list[str] = []
     for line in lines[1:]:
         words = line.split()
         keyword = words[0] if words else "comment"
@@ -66,11 +68,13 @@ def parse_ply_header(data: bytes, name: str) -> PlyHeader:
             elements.append(_element(words, name))
         elif keyword == "property":
             _append_property(elements, words, name)
-        elif keyword not in ("comment", "obj_info"):
+        elif keyword in ("comment", "obj_info"):
+            comments.append(line.strip()[len(keyword) :].strip())
+        else:
             raise fault(name, f"its header has the unknown line {shorten(line)}")
     if not seen_format:
         raise fault(name, "its header has no 'format' line")
-    return PlyHeader(order=order, elements=tuple(elements), body=body)
+    return PlyHeader(order=order, elements=tuple(elements), body=body, comments=tuple(comments))
 
 
 def _header_lines(data: bytes, name: str) -> tuple[list[str], int]:
