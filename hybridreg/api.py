@@ -86,7 +86,7 @@ def register(
     source_viewpoint, target_viewpoint : "auto", "none", (3,), (N, 3), or ((k, 3), (N,))
         Where each sensor stood, in the coordinates of its points; see `PointCloud.of`. Give it for maps, merged clouds
         and vehicle frames: without it free space cannot be tested.
-    init : (4, 4), path of such a matrix, or None
+    init : (4, 4), path of a pose in any form that `result.format` writes, in .npy or .json, or None
         A rough pose, source to target; searched around first.
     max_translation, max_rotation : float or None
         Metres that the middle of the source may lie away from where `init` (or nothing) puts it; degrees that the pose

@@ -121,8 +121,10 @@ def check(points: Array, name: str) -> None:
     low, high, middle = _reach(points)
     largest = float(max(np.abs(low).max(), np.abs(high).max()))
     if largest > _LARGEST:
+        beyond = int((np.abs(points) > _LARGEST).any(axis=1).sum())
         raise ValueError(
-            f"{name}: a coordinate of {largest:.3g} m cannot be real; check the file and its unit"
+            f"{name}: a coordinate of {largest:.3g} m cannot be real, {beyond} of {len(points)} points have such "
+            "a one; check the file and its unit, or remove them where they stand for missing returns"
         )
     longest = float((high - low).max())
     if not longest > 1e-9 * max(largest, 1e-300):

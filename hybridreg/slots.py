@@ -103,15 +103,14 @@ def checked(slot: str, stage: Any, value: Any, scene: Scene | None = None) -> An
 
 
 def check_matches(found: Correspondences, whose: str) -> None:
-    """Refuse matches with coordinates or weights that are not finite, or negative weights; `whose` begins the message."""
+    """Refuse matches that are not finite or whose weights are negative; `whose` begins the message."""
     for part in ("source", "target", "weight"):
-        finite = np.isfinite(getattr(found, part).reshape(len(found), 1 if part == "weight" else 3)).all(
-            axis=1
-        )
+        width = 1 if part == "weight" else 3
+        finite = np.isfinite(getattr(found, part).reshape(len(found), width)).all(axis=1)
         if not finite.all():
             raise ValueError(
-                f"{whose} whose {part} is not finite in {np.count_nonzero(~finite)} of {len(found)} rows (the first is row "
-                f"{int(np.argmin(finite))}); leave these out"
+                f"{whose} whose {part} is not finite in {np.count_nonzero(~finite)} of {len(found)} rows (the first is "
+                f"row {int(np.argmin(finite))}); leave these out"
             )
     if (lightest := float(np.min(found.weight, initial=0.0))) < 0.0:
         raise ValueError(f"{whose} with a weight of {lightest:.3g}; weights must not be negative")

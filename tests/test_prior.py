@@ -18,6 +18,10 @@ from hybridreg.cli.app import app
 from hybridreg.data.loaders.folder import load_pair
 from hybridreg.geometry import se3
 from hybridreg.io import write_matrix, write_points
+from hybridreg.io.poses.pose_file import read_pose
+from hybridreg.output.pose_files import pose_files
+from hybridreg.output.pose_text import FORMATS, pose_text
+from hybridreg.prior.prior import Prior
 
 DEMO = Path(hr.__file__).parent / "data" / "demo"
 
@@ -304,3 +308,74 @@ def test_the_command_line(demo: Any, tmp_path: Path) -> None:
         done = CliRunner().invoke(app, [*call, *wrong])
         assert done.exit_code == 2, wrong
         assert wrong[0] in done.stderr or wrong[1] in done.stderr
+
+
+TURNED = se3.from_rt(se3.rotation_about(np.array([0.3, -1.2, 0.5])), np.array([4.0, -5.5, 0.25]))
+BARE = "\n".join(" ".join(map(str, row)) for row in TURNED)
+
+
+@pytest.mark.parametrize("form", FORMATS)
+def test_every_pose_that_the_library_writes_is_read(tmp_path: Path, form: str) -> None:
+    (tmp_path / "pose.txt").write_text(pose_text(TURNED, form) + "\n")
+    np.testing.assert_allclose(Prior(init=tmp_path / "pose.txt").init, TURNED, rtol=0, atol=1e-14)
+
+
+@pytest.mark.parametrize("form", FORMATS)
+def test_files_of_many_poses_are_no_start(tmp_path: Path, form: str) -> None:
+    for name, text in pose_files(["a", "b", "c"], np.stack([np.eye(4), TURNED, TURNED]), 0, form).items():
+        path = tmp_path / Path(name).name
+        path.write_text(text)
+        if form in ("matrix", "cloudcompare"):
+            read_pose(path)
+        else:
+            with pytest.raises(ValueError, match=rf"{re.escape(str(path))}: holds"):
+                read_pose(path)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        f"# source to target\n{BARE}",
+        f"Transformation matrix\n{BARE}\n",
+        str(TURNED.tolist()),
+        np.array2string(TURNED, precision=17),
+        BARE.replace(" ", ","),
+        BARE.replace(".", ",").replace(" ", ";"),
+        " ".join(BARE.split()),
+    ],
+)
+def test_other_ways_to_write_a_matrix_are_read(tmp_path: Path, text: str) -> None:
+    (tmp_path / "pose.txt").write_text(text)
+    np.testing.assert_allclose(read_pose(tmp_path / "pose.txt"), TURNED, rtol=0, atol=1e-14)
+
+
+def test_a_matrix_of_numpy_or_json_is_read(tmp_path: Path) -> None:
+    np.save(tmp_path / "T.npy", TURNED)
+    (tmp_path / "T.json").write_text(json.dumps({"T": TURNED.tolist()}))
+    for name in ("T.npy", "T.json"):
+        np.testing.assert_array_equal(read_pose(tmp_path / name), TURNED)
+
+
+@pytest.mark.parametrize(
+    "text, words",
+    [
+        ("T: [1, 0, 0, 6]", "holds 'T:' where a number of a pose is needed; write a pose as four lines"),
+        ("1.0 0 0 0\n0 1 0 0", "holds 8 numbers; write a pose"),
+        ("1 2 3 0 0 14", "holds 6 numbers; write a pose as four lines"),
+        ("1 2 3 0 0 0 9", "have the length 9, a quaternion has 1"),
+        ("1 0 0\n0 1 0\n0 0 1\n5 6 7", "holds four rows of three numbers; transpose it"),
+        ("static_transform_publisher --x 1 --yaw 2", "has no --y, --z, --qx"),
+        ('<origin xyz="1 2"/>', "its xyz holds 2 numbers"),
+        ("PK\x03\x04\x00", "is a zip archive, not a pose"),
+    ],
+)
+def test_text_that_is_no_pose_is_refused_with_what_is_expected(tmp_path: Path, text: str, words: str) -> None:
+    (tmp_path / "pose.txt").write_text(text)
+    with pytest.raises(ValueError, match=re.escape(words)):
+        read_pose(tmp_path / "pose.txt")
+
+
+def test_json_without_a_pose_is_refused_by_its_entries(tmp_path: Path) -> None:
+    (tmp_path / "p.json").write_text('{"pose": 3}')
+    with pytest.raises(ValueError, match=r"has no entry T_target_source .* among 'pose'"):
+        read_pose(tmp_path / "p.json")

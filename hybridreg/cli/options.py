@@ -47,7 +47,7 @@ Viewpoint = Annotated[
     typer.Option(metavar="x,y,z|none|auto", help="Position of its sensor, metres in the cloud's own frame."),
 ]
 
-Init = Annotated[Path | None, typer.Option(help="A rough pose: a file of a 4x4 matrix, or a result.json.")]
+Init = Annotated[Path | None, typer.Option(help="A rough pose: a file of any --format, .npy or result.json.")]
 MaxTranslation = Annotated[float | None, typer.Option(help="Farthest from there, metres.")]
 MaxRotation = Annotated[float | None, typer.Option(help="Farthest turned from there, degrees.")]
 Gravity = Annotated[

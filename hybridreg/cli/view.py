@@ -42,7 +42,7 @@ def command(
     from hybridreg.geometry import se3
     from hybridreg.io import write_text
     from hybridreg.io.point_files import selection_for
-    from hybridreg.io.pose_file import read_pose
+    from hybridreg.io.poses.pose_file import read_pose
     from hybridreg.pair import Pair
     from hybridreg.prior.placing import sized
 

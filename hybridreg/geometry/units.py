@@ -16,13 +16,14 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-_UNITS = ((1e-3, "millimetres"), (1e-2, "centimetres"), (1e3, "kilometres"))
+_UNITS = ((1e-3, "millimetres"), (1e-2, "centimetres"), (0.0254, "inches"))
 # Extents of most scans, from an object on a table to a street; by hand.
 _SHORTEST = 0.3  # metres
 _LONGEST = 300.0  # metres
 _USUAL = 15.0  # metres, about the geometric middle
 _UNLIKE = 25.0  # factor: extents of two clouds of one place differ by less; by hand
 _NEAR = 5.0  # factor by which their ratio may differ from that of two units; by hand
+_AS_NEAR = 3.0  # factor within which two units explain a ratio about as well; by hand
 _DEGREES = 0.2  # degrees: extent of a scan in longitude and latitude, at most; by hand
 _UPRIGHT = 100.0  # least ratio to that of its spread along z, which is in metres; by hand
 _LOOKED_AT = 2_000
@@ -96,10 +97,21 @@ def _unlike(pair: Pair) -> dict[str, str]:
             small: f"it reaches {reaches[small]:.3g} m where the {large} reaches {reaches[large]:.3g} m: probably "
             f"{unit}; lengths here are metres"
         }
-    likely = [(metres, unit) for metres, unit in _UNITS[:2] if 1 / _NEAR < ratio * metres < _NEAR]
+    likely = _likely(ratio)
     if not likely:
         return {large: f"it reaches {told}: is one of them in another unit, or another place?"}
-    metres, unit = min(likely, key=lambda each: abs(np.log(ratio * each[0])))
+    units = " or ".join(unit for _, unit in likely)
+    factors = " or ".join(f"{metres:g}" for metres, _ in likely)
     return {
-        large: f"it reaches {told}: probably {unit}; multiply by {metres:g} if so, lengths here are metres"
+        large: f"it reaches {told}: probably {units}; multiply by {factors} if so, lengths here are metres"
     }
+
+
+def _likely(ratio: float) -> list[tuple[float, str]]:
+    """Units that explain why a cloud reaches so many times as far as one in metres, the likeliest first."""
+
+    def off(each: tuple[float, str]) -> float:
+        return abs(float(np.log(ratio * each[0])))
+
+    near = sorted((each for each in _UNITS if off(each) < np.log(_NEAR)), key=off)
+    return [each for each in near if off(each) - off(near[0]) < np.log(_AS_NEAR)]

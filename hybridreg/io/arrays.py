@@ -10,13 +10,15 @@ from numpy.typing import NDArray
 
 from hybridreg.io.column_names import axes_in
 from hybridreg.io.faults import fault
+from hybridreg.io.meaning.first_column import FEWEST, check_first_column
+from hybridreg.io.meaning.image_shapes import check_photo, refuse_image
+from hybridreg.io.meaning.length_units import in_metres
 from hybridreg.io.record_fields import stack_axes
 
 Array = NDArray[np.float64]
 
 # Fields of one array that hold all three coordinates.
 TOGETHER = ("xyz", "points", "point", "positions", "position", "pos", "coords", "coord", "coordinates")
-FEWEST = 20  # points of a cloud, at least
 # So 3 to 6 rows of at least that length are channels: x, y, z, w (or intensity), ring, time.
 _MOST_CHANNELS = 6
 # Sensors have eight rows or more; a stack with fewer is more likely several clouds.
@@ -25,7 +27,7 @@ _FEWEST_ROWS = 8
 _LAS_ONLY = ("bit_fields", "raw_classification", "point_source_id")
 
 
-def array_points(array: NDArray[Any], name: str, *, batched: bool = False) -> Array:
+def array_points(array: NDArray[Any], name: str, *, batched: bool = False, cure: str = "") -> Array:
     """x, y and z, shape (N, 3), a copy; masked values become NaN.
 
     Parameters
@@ -36,6 +38,8 @@ def array_points(array: NDArray[Any], name: str, *, batched: bool = False) -> Ar
         What error messages call the cloud.
     batched : bool
         Whether a third dimension means several clouds (torch), not rows of one.
+    cure : str
+        How to leave out a first column that is no x; empty for an array, which is told its slice.
 
     Raises
     ------
@@ -47,20 +51,14 @@ def array_points(array: NDArray[Any], name: str, *, batched: bool = False) -> Ar
     if array.dtype.kind not in "fiu":
         raise fault(name, f"coordinates must be numbers, got dtype {_short(array)}", _as_numbers(array))
     rows = _rows(array, name, batched)
-    if rows.shape[1] > 3 and counts_up(rows[:, 0]):
-        raise fault(
-            name, "its first column is a row number, not a coordinate", "leave it out: give columns 2 to 4"
-        )
+    check_first_column(rows, name, cure or f"leave it out: give columns 2 to 4, {_without_first(array)}")
     return _numbers(rows[:, :3])
-
-
-def counts_up(column: NDArray[Any]) -> bool:
-    """Whether a column holds row numbers: at least 20 values, each one more than the last."""
-    return bool(len(column) >= FEWEST and column[1] - column[0] == 1 and np.all(np.diff(column) == 1))
 
 
 def _rows(array: NDArray[Any], name: str, batched: bool) -> NDArray[Any]:
     shape = array.shape
+    if array.ndim == 3 and {shape[0], shape[2]} & {3, 4}:
+        check_photo(array, name)
     if array.ndim == 2 and shape[0] in range(3, _MOST_CHANNELS + 1) and shape[1] >= FEWEST:
         return array.T
     if array.ndim == 3 and 3 <= shape[2] <= _MOST_CHANNELS and not (batched and shape[0] > 1):
@@ -74,10 +72,21 @@ def _rows(array: NDArray[Any], name: str, batched: bool) -> NDArray[Any]:
         return array.reshape(shape[0], -1).T
     if array.ndim == 2 and shape[1] >= 3:
         if shape[0] < FEWEST <= shape[1]:
-            cure = "if they are channels, transpose and choose: x[:3].T"
+            cure = (
+                "if they are channels, transpose and choose: x[:3].T; a range image must be unprojected first"
+            )
             raise fault(name, f"expected an array of shape (N, 3), got {shape}, {shape[0]} points", cure)
+        refuse_image(shape[0], shape[1], name)
         return array
+    flat = np.squeeze(array)
+    if flat.ndim == 2:
+        refuse_image(flat.shape[0], flat.shape[1], name)
     raise fault(name, f"expected an array of shape (N, 3), got {shape}", _shape_cure(array, batched))
+
+
+def _without_first(array: NDArray[Any]) -> str:
+    channels = array.shape[0] in range(3, _MOST_CHANNELS + 1) and array.shape[-1] > _MOST_CHANNELS
+    return "x[1:4]" if channels else "x[..., 1:4]"
 
 
 def _shape_cure(array: NDArray[Any], batched: bool) -> str:
@@ -104,9 +113,7 @@ def _of_fields(array: NDArray[Any], name: str) -> Array:
     columns = [np.ravel(array[names[column]]) for column in axes.columns]
     if any(column.dtype.kind not in "fiu" or len(column) != array.size for column in columns):
         raise fault(name, f"its x, y and z are {_short(array)}, not one number each", _as_numbers(columns[0]))
-    axes.tell(name)
-    points = stack_axes(*(_numbers(column) for column in columns))
-    return points if axes.metres == 1.0 else points * axes.metres
+    return in_metres(stack_axes(*(_numbers(column) for column in columns)), axes.metres, name)
 
 
 def _numbers(values: NDArray[Any]) -> Array:

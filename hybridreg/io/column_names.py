@@ -4,11 +4,11 @@
 from __future__ import annotations
 
 import re
-import warnings
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 from hybridreg.io.faults import fault, shorten
+from hybridreg.io.meaning.length_units import ANGLES, METRES
 
 _AXES = ("x", "y", "z")
 # What tools put before or behind an axis: ROS, E57, ParaView, spreadsheets. Not `n` or `v`: normals and velocities.
@@ -16,19 +16,7 @@ _AFFIXES = (
     "point", "points", "pos", "position", "coord", "coords", "coordinate", "cartesian", "p", "xyz", "lidar", "velo",
     "sensor", "loc", "location", "points_m_xyz", "first", "1",
 )  # fmt: skip
-_METRES = {
-    **dict.fromkeys(("m", "metre", "metres", "meter", "meters"), 1.0),
-    **dict.fromkeys(("mm", "millimetre", "millimetres", "millimeter", "millimeters"), 1e-3),
-    **dict.fromkeys(("cm", "centimetre", "centimetres", "centimeter", "centimeters"), 1e-2),
-    **dict.fromkeys(("dm", "decimetre", "decimetres", "decimeter", "decimeters"), 1e-1),
-    **dict.fromkeys(("km", "kilometre", "kilometres", "kilometer", "kilometers"), 1e3),
-    **dict.fromkeys(("ft", "foot", "feet"), 0.3048),
-    **dict.fromkeys(("ftus", "us-ft", "usft", "us survey foot", "us survey feet"), 1200 / 3937),
-    **dict.fromkeys(("in", "inch", "inches"), 0.0254),
-}
-_ANGLES = ("deg", "degree", "degrees", "°", "rad", "radian", "radians")
 _NAME = re.compile(r"(.*?)\s*(?:[\[(]([^\])]*)[\])]?|[/|]\s*([^/|]+)|[_ ](mm|cm|dm|m|km|ft))?")
-_SAID = re.compile(r"\bunits?\b\W*(?:is|are|in)?\W*([a-z-]+)", re.IGNORECASE)
 
 
 class Axes(NamedTuple):
@@ -36,16 +24,6 @@ class Axes(NamedTuple):
 
     columns: tuple[int, int, int]
     metres: float = 1.0
-
-    def tell(self, name: str) -> None:
-        """Warn where the cloud called `name` is not in metres, since its pose will be."""
-        if self.metres != 1.0:
-            warnings.warn(
-                f"{name}: its own header says that its unit is {self.metres:.6g} m; it was read in metres, and the "
-                "pose is in metres too",
-                UserWarning,
-                stacklevel=3,
-            )
 
 
 def find_axes(names: Sequence[str], name: str) -> Axes | None:
@@ -95,12 +73,6 @@ def axes_in(names: Sequence[str], name: str) -> Axes:
     raise fault(name, problem, "name the coordinates x, y and z, each once")
 
 
-def unit_said(text: str) -> float:
-    """Metres of the unit that a comment such as `unit: mm` names; 1 where it names no known unit."""
-    found = _SAID.search(text)
-    return _METRES.get(found.group(1).lower(), 1.0) if found else 1.0
-
-
 def _split(label: str) -> tuple[str, str]:
     """Lower-case name without quotes, and its unit."""
     match = _NAME.fullmatch(str(label).strip().strip("\"'").strip().lower())
@@ -134,10 +106,10 @@ def _groups(stems: Sequence[str]) -> Iterator[tuple[int, int, int]]:
 
 def _with_unit(columns: tuple[int, int, int], parsed: Sequence[tuple[str, str]], name: str) -> Axes:
     units = [parsed[column][1] for column in columns]
-    angle = next((unit for unit in units if unit in _ANGLES), None)
+    angle = next((unit for unit in units if unit in ANGLES), None)
     if angle is not None:
         raise fault(name, f"its x, y or z is in {angle!r}", "give Cartesian coordinates in metres")
-    metres = [_METRES.get(unit, 1.0) for unit in units]
+    metres = [METRES.get(unit, 1.0) for unit in units]
     if len(set(metres)) > 1:
         told = ", ".join(unit or "none" for unit in units)
         raise fault(name, f"the units of its x, y and z differ: {told}", "give all three in one unit")

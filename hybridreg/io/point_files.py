@@ -85,11 +85,11 @@ def read_points(path: str | os.PathLike[str]) -> NDArray[np.float64]:
     """Read the coordinates of a point cloud in the file's own frame, converted to metres where the file gives a unit.
 
     The file name's ending chooses the format: `.ply` (ascii, binary), `.pcd` (ascii, binary,
-    binary_compressed), `.bin` (float32 rows of three to six numbers, as KITTI and nuScenes have four and five),
-    `.npy`, `.npz` (array `xyz`, `points`, `arr_0` or the only one that fits), text (`.xyz`, `.txt`, `.csv`, `.tsv`,
-    `.asc`, `.pts`, `.xyzn`, `.xyzrgb`, `.xyzi`), `.las`/`.laz` (extra `las`; COPC too), and what `READERS` lists: bags
-    (extra `ros`), `.e57` (extra `e57`), `.lvx2`, Arrow's tables (extra `arrow`), meshes (extra `mesh`) and `.vtp`
-    (extra `vtk`); of several clouds the first.
+    binary_compressed), `.bin` (float32 rows of three to sixteen numbers, as KITTI and nuScenes have four and five),
+    `.npy`, `.npz` (array `xyz`, `points`, `arr_0`, the only one that fits, or `x`, `y` and `z`), text (`.xyz`, `.txt`,
+    `.csv`, `.tsv`, `.asc`, `.pts`, `.xyzn`, `.xyzrgb`, `.xyzi`), `.las`/`.laz` (extra `las`; COPC too), and what
+    `READERS` lists: bags (extra `ros`), `.e57` (extra `e57`), `.lvx2`, Arrow's tables (extra `arrow`), meshes (extra
+    `mesh`) and `.vtp` (extra `vtk`); of several clouds the first.
     A file that is not what its name says is refused. Rows that are not finite are kept: the gate decides about them.
 
     Parameters
@@ -158,7 +158,7 @@ def selection_for(path: str | os.PathLike[str], choice: Mapping[str, Any]) -> Se
 
 
 def read_viewpoint(path: str | os.PathLike[str]) -> NDArray[np.float64] | None:
-    """Where the sensor stood, (3,) in the file's own frame and unit, as a `.pcd` file may give it; otherwise None.
+    """Where the sensor stood, (3,) among the points that `read_points` gives, as a `.pcd` file may tell; else None.
 
     Raises
     ------

@@ -12,8 +12,12 @@ from numpy.typing import NDArray
 
 from hybridreg.io import tables
 from hybridreg.io.arrays import TOGETHER, array_points
-from hybridreg.io.formats.las_units import in_metres
-from hybridreg.io.recorded import ros_messages
+from hybridreg.io.coordinate_systems.las_extended import records_of_header
+from hybridreg.io.coordinate_systems.las_units import in_metres
+from hybridreg.io.formats.las_withheld import without_withheld
+from hybridreg.io.list_columns import listed_points
+from hybridreg.io.meaning import length_units
+from hybridreg.io.recorded import ros_messages, vtk_objects
 
 Array = NDArray[np.float64]
 
@@ -32,7 +36,10 @@ def points_of(x: Any, name: str, depth: int = 0) -> Array:
         Nothing there holds points, or it is a mesh and not a cloud; the message says what to pass instead.
     """
     if isinstance(x, np.ndarray):
-        return _from_array(x, name)
+        plain = (
+            np.asarray(x) if hasattr(x, "unit") else x
+        )  # astropy's quantities compare with their like alone
+        return length_units.in_metres(_from_array(plain, name), length_units.unit_given(x, name), name)
     if hasattr(x, "detach") and hasattr(x, "cpu"):
         return _from_torch(x, name)
     if ros_messages.is_cloud(x):
@@ -44,21 +51,30 @@ def points_of(x: Any, name: str, depth: int = 0) -> Array:
             x.point["positions"].cpu().numpy() if "positions" in x.point else np.empty((0, 3)), name
         )
     names = tables.labels(x)
+    _refuse_grid(x, names, name)
     if names is not None:
         return _from_table(x, names, name, depth)
+    if vtk_objects.is_vtk(x):
+        return _from_vtk(x, name)
+    clouds = _clouds_of_scene(x)
+    if clouds is not None:
+        return _from_array(clouds, name)
     _refuse_mesh(x, name)
     if hasattr(getattr(x, "header", None), "vlrs") and hasattr(x, "xyz"):  # laspy
-        return in_metres(_from_array(np.asarray(x.xyz), name), x.header.vlrs, name)
+        points = without_withheld(_from_array(np.asarray(x.xyz), name), getattr(x, "withheld", None), name)
+        return in_metres(points, records_of_header(x.header, name), name)
     held = _held(x)
     if held is not None and depth < _DEEPEST:
-        return points_of(held, name, depth + 1)
+        return _held_points(held, x, name, depth)
     if all(hasattr(x, axis) for axis in "xyz"):  # laspy's records
-        return tables.points({axis: getattr(x, axis) for axis in "xyz"}, list("xyz"), name)
+        points = tables.points({axis: getattr(x, axis) for axis in "xyz"}, list("xyz"), name)
+        return without_withheld(points, getattr(x, "withheld", None), name)
     if isinstance(x, (list, tuple)) and x and not isinstance(x[0], (list, np.ndarray, int, float)):
         rows = _named_rows(x)
         if rows is not None:
             return points_of(rows, name, depth + 1)
-    return _from_array(_as_array(x, name), name)
+    points = _from_array(_as_array(x, name), name)
+    return length_units.in_metres(points, length_units.unit_given(x, name), name)
 
 
 def _from_array(array: NDArray[Any], name: str, batched: bool = False) -> Array:
@@ -88,11 +104,40 @@ def _from_table(x: Any, names: list[Any], name: str, depth: int) -> Array:
             (names[lowered.index(each)] for each in (*TOGETHER, "arr_0") if each in lowered), None
         )
         if together is not None:
-            return points_of(x[together], name, depth + 1)
+            return _held_points(x[together], x, name, depth)
+    listed = None if isinstance(x, Mapping) else listed_points(x, names, name)
+    if listed is not None:
+        return _from_array(listed, name)
     return tables.points(x, names, name)
 
 
+def _from_vtk(x: Any, name: str) -> Array:
+    if not vtk_objects.is_cloud(x):
+        cure = "save it as .vtp and give the file, whose surface becomes points, or pass its vertices, x.GetPoints()"
+        _refuse(x, name, f"a surface or a grid is not a cloud; {cure}, where they lie densely")
+    return _from_array(vtk_objects.vtk_points(x, name), name)
+
+
+def _clouds_of_scene(x: Any) -> Array | None:
+    # trimesh's scenes: clouds alone, each moved to its place.
+    parts = getattr(x, "geometry", None)
+    if not isinstance(parts, Mapping) or not parts or not callable(getattr(x, "dump", None)):
+        return None
+    if any(hasattr(part, "faces") or not hasattr(part, "vertices") for part in parts.values()):
+        return None
+    return np.vstack([np.asarray(part.vertices, dtype=np.float64) for part in x.dump()])
+
+
+def _held_points(held: Any, x: Any, name: str, depth: int) -> Array:
+    points = points_of(held, name, depth + 1)
+    # What lies deepest knows best, and was read in metres.
+    said = None if length_units.unit_given(held, name) else length_units.unit_given(x, name)
+    return length_units.in_metres(points, said, name)
+
+
 def _held(x: Any) -> Any:
+    if hasattr(x, "magnitude") and hasattr(x, "units"):  # pint
+        return x.magnitude
     for attribute in _HOLD:
         held = getattr(x, attribute, None)
         held = held() if callable(held) else held  # small_gicp's points are a method
@@ -124,6 +169,19 @@ def _named_rows(rows: Any) -> Any:
     return None
 
 
+def _refuse_grid(x: Any, names: list[Any] | None, name: str) -> None:
+    # xarray's: heights or ranges over the dimensions x and y, which are their coordinates.
+    flat = {str(each).lower() for each in getattr(x, "dims", ())}
+    if (
+        not {"x", "y"} <= flat
+        or not hasattr(x, "to_dataframe")
+        or {"x", "y", "z"} <= {*map(str, names or ())}
+    ):
+        return
+    call = "to_dataframe()" if hasattr(x, "data_vars") else 'to_dataframe("z")'
+    _refuse(x, name, f"it is a grid over x and y, not points; if it holds heights: x.{call}.reset_index()")
+
+
 def _refuse_mesh(x: Any, name: str) -> None:
     if hasattr(x, "geometry") and callable(getattr(x, "to_mesh", None)):
         _refuse(x, name, "a scene is not a cloud; sample its surfaces: x.to_mesh().sample(100_000)")
@@ -152,6 +210,9 @@ def _as_array(x: Any, name: str) -> NDArray[Any]:
     if isinstance(x, (bytes, bytearray)):
         _refuse(x, name, "bytes have no type; pass numpy.frombuffer(x, dtype).reshape(-1, 3)")
     array = np.ma.asarray(x) if np.ma.isMaskedArray(x) else np.asarray(x)
+    if isinstance(x, (list, tuple)) and any(np.ma.isMaskedArray(each) for each in x):
+        # numpy leaves the masks out
+        array = np.ma.array(array, mask=[np.ma.getmaskarray(each) for each in x])
     if array.ndim == 0 and array.dtype.kind in "OUS":
         read = callable(getattr(x, "read", None))
         _refuse(x, name, "pass what its read() returns" if read else _CURE)

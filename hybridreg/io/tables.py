@@ -13,6 +13,8 @@ from numpy.typing import NDArray
 from hybridreg.io.arrays import array_points
 from hybridreg.io.column_names import axes_in, find_axes
 from hybridreg.io.faults import fault, shorten
+from hybridreg.io.meaning.image_shapes import refuse_image
+from hybridreg.io.meaning.length_units import in_metres, one_unit, unit_given
 from hybridreg.io.record_fields import stack_axes
 
 Array = NDArray[np.float64]
@@ -48,19 +50,29 @@ def points(x: Any, names: list[Any], name: str) -> Array:
         No columns, or several, that could be x, y and z; columns of unequal length, or without numbers.
     """
     told = [str(each[-1]) if isinstance(each, tuple) else str(each) for each in names]
-    if len(names) >= 3 and all(_UNNAMED.fullmatch(each) for each in told) and find_axes(told, name) is None:
-        # Positions again: the first may count the rows.
-        return array_points(
-            np.column_stack([_numbers(x, k, names, name) for k in range(min(4, len(names)))]), name
-        )
+    unnamed = len(names) >= 3 and all(_UNNAMED.fullmatch(each) for each in told)
+    if unnamed:
+        refuse_image(len(_numbers(x, 0, names, name)), len(names), name)
+    if unnamed and find_axes(told, name) is None:
+        # Positions again: the first may be none.
+        columns = [_numbers(x, k, names, name) for k in range(min(6, len(names)))]
+        return array_points(np.column_stack(columns), name, cure="call the columns of x, y and z so")
     axes = axes_in(told, name)
     columns = [_numbers(x, k, names, name) for k in axes.columns]
     if len({len(column) for column in columns}) > 1:
         lengths = ", ".join(str(len(column)) for column in columns)
         raise fault(name, f"x, y and z have the lengths {lengths}", "give them equally long")
-    axes.tell(name)
-    found = stack_axes(*columns)
-    return found if axes.metres == 1.0 else found * axes.metres
+    metres = axes.metres if axes.metres != 1.0 else _unit(x, axes.columns, names, name)
+    return in_metres(stack_axes(*columns), metres, name)
+
+
+def _unit(x: Any, columns: tuple[int, int, int], names: list[Any], name: str) -> float | None:
+    """Metres of the unit that the columns say, or the table for all of them."""
+    if hasattr(x, "column") and hasattr(x, "schema"):
+        said = one_unit((unit_given(x.schema.field(k), name) for k in columns), name)
+        return unit_given(x.schema, name) if said is None else said
+    said = one_unit((unit_given(_column(x, k, names), name) for k in columns), name)
+    return unit_given(x, name) if said is None else said
 
 
 def _along(x: Any) -> Any:
@@ -74,6 +86,8 @@ def _along(x: Any) -> Any:
 
 
 def _column(x: Any, k: int, names: list[Any]) -> Any:
+    if hasattr(x, "colnames"):  # astropy, whose iloc is another
+        return x[names[k]]
     if hasattr(x, "iloc"):  # pandas, where two columns may have one name
         return x.iloc[:, k]
     if hasattr(x, "column") and hasattr(x, "schema"):
@@ -86,6 +100,7 @@ def _column(x: Any, k: int, names: list[Any]) -> Any:
 def _numbers(x: Any, k: int, names: list[Any], name: str) -> Array:
     """Column `k` as float64, (N,)."""
     values = _column(x, k, names)
+    values = values.magnitude if hasattr(values, "magnitude") and hasattr(values, "units") else values  # pint
     if hasattr(values, "detach"):
         values = values.detach().cpu()
     try:

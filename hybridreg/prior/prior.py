@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from hybridreg.geometry import se3
 from hybridreg.geometry.placement import Placement
 from hybridreg.geometry.pose_bounds import PoseBounds
-from hybridreg.io.pose_file import read_pose
+from hybridreg.io.poses.pose_file import read_pose
 from hybridreg.pair import Pair
 from hybridreg.prior import placing, size_search
 
@@ -30,7 +30,7 @@ class Prior:
 
     Parameters
     ----------
-    init : (4, 4), path of such a matrix as text, or None
+    init : (4, 4), path of a pose in any form that `result.format` writes, in .npy or .json, or None
         A rough pose, source to target, in the coordinates of both clouds. Searched around first.
     max_translation : float or None
         Metres that the middle of the source may lie away from where `init` (or nothing) puts it. A start that is turned

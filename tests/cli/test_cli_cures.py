@@ -137,5 +137,26 @@ def test_cures_name_options(cloud: Path, arguments: list[str], words: str) -> No
     assert words in " ".join(done.output.split())
 
 
+@pytest.mark.parametrize(
+    "array, words",
+    [
+        (np.full((50, 3), "1.5"), "save the file again with x.astype(float) of its array x"),
+        (np.full((50, 3), "a"), "save the file again as an array of numbers, one row x, y, z a point"),
+        (np.ones((2, 50, 3)), "of the file's array x, save one, x[0], to a file of its own, or all as one"),
+        (np.ones((50, 3), dtype=complex), "save the file again with the real part of its array x: x.real"),
+        (np.ones(60), "one point after another, save the file again with x.reshape(-1, 3)"),
+        (np.ones((50, 2)), "needs three coordinates: save the file again with x, y and z of each point"),
+        (np.ones((9, 50, 2)), "save the file again with one row x, y, z a point"),
+        (np.ones((10, 50)), "if they are channels, save the file again with x[:3].T of its array x"),
+        (np.column_stack([np.arange(50), np.ones((50, 3))]), "save the file again with columns 2 to 4"),
+    ],
+)
+def test_what_to_do_with_an_array_is_told_of_its_file(cloud: Path, array: np.ndarray, words: str) -> None:
+    np.save(cloud / "odd.npy", array)
+    done = register(cloud / "odd.npy", cloud / "whole.npy", *IDENTITY)
+    assert done.exit_code == 2, done.output
+    assert words in " ".join(done.output.split())
+
+
 def test_what_needs_no_translation_stays() -> None:
     assert spoken("target: 3 points are too few") == "target: 3 points are too few"

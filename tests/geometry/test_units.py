@@ -31,7 +31,8 @@ def test_metres_are_not_doubted() -> None:
 
 @pytest.mark.parametrize("blamed", ["source", "target"])
 @pytest.mark.parametrize(
-    "factor, unit", [(1000.0, "millimetres"), (100.0, "centimetres"), (0.001, "kilometres")]
+    "factor, unit",
+    [(1000.0, "millimetres"), (100.0, "centimetres"), (1 / 0.0254, "inches"), (0.001, "kilometres")],
 )
 @pytest.mark.parametrize("size", [1.0, 0.2])
 def test_one_cloud_in_another_unit_is_the_one_to_blame(
@@ -42,6 +43,11 @@ def test_one_cloud_in_another_unit_is_the_one_to_blame(
     found = said(clouds["source"], clouds["target"])
     assert list(found) == [blamed]
     assert unit in found[blamed]
+
+
+def test_units_that_are_about_as_likely_are_both_named() -> None:
+    found = said(STREET.source.points / 0.0254, STREET.target.points)
+    assert "probably inches or centimetres; multiply by 0.0254 or 0.01 if so" in found["source"]
 
 
 @pytest.mark.parametrize("factor, unit", [(1000.0, "millimetres"), (100.0, "centimetres")])

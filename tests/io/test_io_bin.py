@@ -125,6 +125,50 @@ def test_signalling_nans_give_no_warning():
     np.testing.assert_array_equal(parse_bin(table.tobytes(), "a.bin"), table[:, :3])
 
 
+def scan(n):
+    rng = np.random.default_rng(4)
+    return (rng.normal(size=(n, 3)) * [25, 30, 2] + [40, 60, 9]).astype("<f4")
+
+
+WIDE = {
+    "PCL's PointXYZI": lambda p, u: np.c_[p, 0 * u + 1, u, 0 * u, 0 * u, 0 * u],
+    "PCL's PointNormal": lambda p, u: np.c_[
+        p, 0 * u + 1, p / np.linalg.norm(p, axis=1)[:, None], 0 * u, u, 0 * p
+    ],
+    "eight": lambda p, u: np.c_[p, u * 255, np.arange(len(p)) % 64, u, np.linalg.norm(p, axis=1), 0 * u],
+    "colours and more": lambda p, u: np.c_[p, u, u**2, u**3, 1 - u, u],
+    "seven": lambda p, u: np.c_[p, u, u, u, u],
+    "nine": lambda p, u: np.c_[p, np.tile(u, (6, 1)).T],
+    "ten": lambda p, u: np.c_[p, u * 255, np.arange(len(p)) % 64, u, u / 2, u / 3, u / 4, u / 5],
+}
+
+
+@pytest.mark.parametrize("kind", WIDE)
+def test_wider_rows(kind):
+    points = scan(6120)
+    table = WIDE[kind](points, np.random.default_rng(5).uniform(0, 1, 6120)).astype("<f4")
+    np.testing.assert_array_equal(parse_bin(table.tobytes(), "a.bin"), points)
+
+
+def test_lasers_that_fire_in_turn_are_no_wider_rows():
+    points = scan(6000)
+    points[::2, 2] += 30
+    table = np.c_[points, np.random.default_rng(5).uniform(0, 1, 6000)].astype("<f4")
+    table[1:4000:2, :3] = 0  # second returns that are missing
+    np.testing.assert_array_equal(parse_bin(table.tobytes(), "a.bin"), table[:, :3])
+
+
+@pytest.mark.parametrize("more", [0, 1, 2])
+def test_channel_after_channel_is_refused_with_a_cure_that_works(more, tmp_path):
+    table = np.c_[scan(6000), np.random.default_rng(5).uniform(0, 1, (6000, more))].astype("<f4")
+    path = tmp_path / "a.bin"
+    path.write_bytes(np.ascontiguousarray(table.T).tobytes())
+    with pytest.raises(ValueError, match=r"a\.bin: .* channel after channel.*reshape\(4, -1\)\.T"):
+        read_points(path)
+    np.save(tmp_path / "a.npy", np.fromfile(path, "float32").reshape(3 + more, -1).T)
+    np.testing.assert_array_equal(read_points(tmp_path / "a.npy"), table[:, :3])
+
+
 def test_real_sweep(real_data, tmp_path):
     with np.load(real_data / "kitti-odo-5-to-0" / "source.npz") as archive:
         xyz, intensity = archive["xyz"], archive["intensity"]

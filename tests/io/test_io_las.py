@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from hybridreg.io.formats.las import parse_las
+from hybridreg.io.point_objects import points_of
 
 laspy = pytest.importorskip("laspy")
 
@@ -26,6 +27,22 @@ def las(points, scale=0.0001, compress=False, point_format=6):
 def test_scale_and_offset_are_applied(utm_cloud, compress, point_format):
     points = parse_las(las(utm_cloud, compress=compress, point_format=point_format), "a.las")
     np.testing.assert_allclose(points, utm_cloud, rtol=0, atol=1e-8)
+
+
+@pytest.mark.parametrize("point_format", [0, 6])
+def test_withheld_points_are_deleted_ones(utm_cloud, point_format):
+    record = laspy.read(io.BytesIO(las(utm_cloud, point_format=point_format)))
+    record.withheld[::4] = 1
+    stream = io.BytesIO()
+    record.write(stream)
+    kept = np.delete(utm_cloud, slice(None, None, 4), axis=0)
+    words = f"{len(utm_cloud) - len(kept)} of {len(utm_cloud)} points are flagged as withheld"
+    with pytest.warns(UserWarning, match=rf"a\.las: {words}"):
+        points = parse_las(stream.getvalue(), "a.las")
+    np.testing.assert_allclose(points, kept, rtol=0, atol=1e-8)
+    for given in (record, record.points):
+        with pytest.warns(UserWarning, match=words):
+            np.testing.assert_allclose(points_of(given, "cloud"), kept, rtol=0, atol=1e-8)
 
 
 def test_no_points():

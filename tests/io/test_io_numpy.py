@@ -145,6 +145,22 @@ def test_two_candidates_are_refused_with_their_shapes(cloud):
         parse_npz(npz(first=cloud, second=cloud), "a.npz")
 
 
+def test_an_image_beside_the_cloud_is_no_second_candidate(cloud):
+    depth = np.ones((48, 64))
+    np.testing.assert_array_equal(parse_npz(npz(depth=depth, scan=cloud), "a.npz"), cloud)
+    with pytest.raises(ValueError, match=r"'depth'.*48 x 64 numbers are an image"):
+        parse_npz(npz(depth=depth), "a.npz")
+
+
+@pytest.mark.parametrize("key", ["unit", "units", "length_unit"])
+def test_a_unit_in_an_archive_is_believed_and_told(key, cloud):
+    for word in ("mm", b"mm", ["mm"]):
+        with pytest.warns(UserWarning, match=r"a\.npz: its own header says that its unit is 0\.001 m"):
+            points = parse_npz(npz(xyz=cloud, **{key: word}), "a.npz")
+        np.testing.assert_allclose(points, cloud / 1000)
+    np.testing.assert_array_equal(parse_npz(npz(xyz=cloud, **{key: np.arange(3)}), "a.npz"), cloud)
+
+
 def test_archives_without_a_cloud():
     stream = io.BytesIO()
     with zipfile.ZipFile(stream, "w") as archive:

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import base64
+import contextlib
 from collections import namedtuple
 from types import SimpleNamespace
 from typing import Any
@@ -77,6 +79,8 @@ def test_fill_values_are_never_points(fill: float) -> None:
     assert "20 of 60 points" in refused(masked)
     kept = PointCloud.of(masked, nonfinite="drop")
     np.testing.assert_array_equal(kept.points, P[~mask.any(axis=1)])
+    for several in (list(masked), tuple(masked.T), [*masked[:59], P[59]]):
+        assert PointCloud.of(several, nonfinite="drop").dropped == 20
     whole = np.ma.masked_array((P * 100).astype(int), mask)
     assert PointCloud.of(whole, nonfinite="drop").dropped == 20
     rows = np.ma.masked_array(record(("x", "f8"), ("y", "f8"), ("z", "f8")), mask[:, 1])
@@ -104,6 +108,166 @@ def test_several_clouds_are_not_one() -> None:
 def test_a_column_that_counts_is_no_coordinate() -> None:
     assert "is a row number" in refused(np.c_[np.arange(60), P])
     assert "is a row number" in refused(np.c_[np.arange(1, 61), P, P])
+
+
+IMAGE = np.random.default_rng(1).uniform(0.5, 9, (64, 1024)).astype("f4")
+
+
+@pytest.mark.parametrize("kind", ["f4", "u2"])
+@pytest.mark.parametrize("shape", [(64, 1024), (1024, 64), (1, 64, 1024), (64, 1024, 1)])
+def test_an_image_is_no_cloud(shape: tuple[int, ...], kind: str) -> None:
+    pixels = (IMAGE * 7000).astype(kind).reshape(shape)
+    assert "64" in refused(pixels)
+    assert "an image; unproject" in refused(pixels).replace(", not a row for each point", "")
+
+
+def test_images_of_torch_pandas_and_xarray() -> None:
+    assert "an image" in refused(pytest.importorskip("torch").tensor(IMAGE))
+    assert "an image" in refused(pytest.importorskip("pandas").DataFrame(IMAGE))
+    heights = pytest.importorskip("xarray").DataArray(
+        IMAGE, dims=("y", "x"), coords={"x": np.arange(1024.0), "y": np.arange(64.0)}
+    )
+    assert 'x.to_dataframe("z").reset_index()' in refused(heights)
+    assert len(PointCloud.of(heights.to_dataframe("z").reset_index())) == IMAGE.size
+    assert "x.to_dataframe().reset_index()" in refused(heights.to_dataset(name="z"))
+
+
+def test_a_photo_is_no_cloud() -> None:
+    photo = np.random.default_rng(1).integers(0, 256, (48, 64, 3)).astype("u1")
+    assert "colours of a photo" in refused(photo)
+    assert "colours of a photo" in refused(np.moveaxis(photo, -1, 0))
+    with pytest.warns(UserWarning, match="48 x 64 values are those of a photo"):
+        PointCloud.of(photo / 255.0)
+
+
+@pytest.mark.filterwarnings("error")
+def test_features_of_each_point_are_no_image() -> None:
+    points = np.random.default_rng(1).normal(size=(5000, 3))
+    same(np.c_[points, np.ones((5000, 64))], points)
+    same(np.c_[P, np.ones((60, 33))])
+    assert len(PointCloud.of((points * 100 + 1000).astype("u2"))) == 5000
+
+
+def in_millimetres() -> dict[str, Any]:
+    """The same cloud in millimetres, as each package says so that is installed."""
+    mm, axes = P * 1000, dict(zip("xyz", (P * 1000).T, strict=True))
+    held: dict[str, Any] = {"dictionary": {**axes, "unit": "mm"}, "together": {"xyz": mm, "units": "mm"}}
+    held["attribute"] = SimpleNamespace(points=mm, units="millimeters")
+    with contextlib.suppress(ImportError):
+        import pandas as pd
+
+        held["pandas"] = pd.DataFrame(axes)
+        held["pandas"].attrs["units"] = "mm"
+    with contextlib.suppress(ImportError):
+        import xarray as xr
+
+        held["Dataset"] = xr.Dataset({k: ("n", v, {"units": "mm"}) for k, v in axes.items()})
+        held["DataArray"] = xr.DataArray(
+            mm, dims=("n", "axis"), coords={"axis": list("xyz")}, attrs={"units": "mm"}
+        )
+        held["DataArray without labels"] = xr.DataArray(mm, attrs={"units": "mm"})
+    with contextlib.suppress(ImportError):
+        import pyarrow as pa
+
+        fields = [pa.field(k, pa.float64(), metadata={"unit": "mm"}) for k in axes]
+        held["pyarrow"] = pa.table([pa.array(v) for v in axes.values()], schema=pa.schema(fields))
+    with contextlib.suppress(ImportError):
+        import trimesh
+
+        held["trimesh"] = trimesh.PointCloud(mm)
+        held["trimesh"].units = "mm"
+    with contextlib.suppress(ImportError):
+        from astropy import units
+        from astropy.coordinates import CartesianRepresentation
+        from astropy.table import QTable
+
+        held["Quantity"] = mm * units.mm
+        held["CartesianRepresentation"] = CartesianRepresentation(*mm.T * units.mm)
+        held["QTable"] = QTable({k: v * units.mm for k, v in axes.items()})
+    return held
+
+
+MILLIMETRES = in_millimetres()
+
+
+@pytest.mark.parametrize("kind", MILLIMETRES)
+def test_a_unit_in_the_data_is_believed_and_told_once(kind: str) -> None:
+    with pytest.warns(UserWarning, match=r"target: its own header says that its unit is 0\.001 m") as told:
+        cloud = PointCloud.of(MILLIMETRES[kind], name="target")
+    np.testing.assert_allclose(cloud.points, P)
+    assert len(told) == 1
+
+
+@pytest.mark.filterwarnings("error")
+def test_what_is_called_unit_and_is_none() -> None:
+    pd = pytest.importorskip("pandas")
+    same(pd.DataFrame(P, columns=list("xyz")).assign(unit="mm", units=1.0))
+    same({**dict(zip("xyz", P.T, strict=True)), "unit": P[:, 0]})
+    same(SimpleNamespace(points=P, units="m"))
+    same(SimpleNamespace(points=P, units=None))
+
+
+def test_angles_and_units_that_differ_are_refused() -> None:
+    assert "'degrees_north'" in refused({**dict(zip("xyz", P.T, strict=True)), "units": "degrees_north"})
+    xr = pytest.importorskip("xarray")
+    units = {"x": "mm", "y": "mm", "z": "m"}
+    mixed = xr.Dataset({k: ("n", v, {"units": units[k]}) for k, v in zip("xyz", P.T, strict=True)})
+    assert "differ: 0.001 m, 0.001 m, 1 m" in refused(mixed)
+
+
+R = np.linalg.norm(P, axis=1)
+
+
+def test_a_range_before_the_points_is_no_coordinate() -> None:
+    for table in (np.c_[R, P], np.c_[R, P, R].astype("f4")):
+        assert "length of the next three" in refused(table)
+        assert "x[..., 1:4]" in refused(table)
+        same(table[..., 1:4], table[..., 1:4].astype(float))
+    missing = np.c_[R, P, R].T.reshape(5, 6, 10).copy()
+    missing[:, ::3] = -1
+    assert "x[1:4]" in refused(missing)
+
+
+FIRST = {
+    "0 in each row, like an index in a batch": np.zeros(60),
+    "2 whole numbers, like a ring": np.repeat([0, 1], 30),
+    "16 whole numbers, like a ring": np.arange(60) % 16,
+    "1.6e.09, like a time": 1.6e9 + np.random.default_rng(3).uniform(0, 0.1, 60),
+    "rises from row to row, like a time": np.linspace(0, 0.1, 60),
+    "rises from row to row": np.arange(60) * 10,
+    "rises .* a number of the row": np.cumsum(np.random.default_rng(3).integers(1, 90, 60)),
+}
+
+
+@pytest.mark.parametrize("words", FIRST)
+def test_a_doubtful_first_column_is_told(words: str) -> None:
+    pd = pytest.importorskip("pandas")
+    table = np.c_[FIRST[words], P]
+    with pytest.warns(
+        UserWarning, match=rf"target: its first column was read as x, and .*{words}.*x\[\.\.\., 1:4\]"
+    ):
+        PointCloud.of(table, name="target")
+    with pytest.warns(UserWarning, match="call the columns of x, y and z so"):
+        PointCloud.of(pd.DataFrame(table))
+
+
+def test_normals_before_the_points_are_told() -> None:
+    with pytest.warns(UserWarning, match=r"first three columns .* length 1 in each row"):
+        PointCloud.of(np.c_[P / R[:, None], P])
+
+
+@pytest.mark.filterwarnings("error")
+def test_first_columns_that_may_well_be_x() -> None:
+    x, y = (each.ravel() for each in np.meshgrid(np.arange(40.0), np.arange(30.0), indexing="ij"))
+    heights = np.c_[x, y, np.sin(x) + np.cos(y), x % 5]
+    for table in (heights, heights[:, [1, 0, 2, 3]], heights * [0.5, 0.5, 1, 1]):
+        same(table, table[:, :3])
+    sorted_ = np.unique(np.c_[P, R], axis=0)
+    same(sorted_, sorted_[:, :3])
+    same(np.c_[P, P / R[:, None]])
+    same(np.c_[0 * R, P[:, 1:], R / R.max()], P * [0, 1, 1])  # a flat scan with an intensity
+    cells = np.unique(np.floor(P * 4), axis=0)
+    same(np.c_[cells, cells[:, 0] * 0], cells)
 
 
 def test_tensors() -> None:
@@ -159,6 +323,33 @@ def test_point_cloud_2(order: str, rows: int) -> None:
     same(message, expected)
     message.data = message.data[:100]
     assert "holds 100 bytes" in refused(message)
+
+
+def test_point_cloud_2_as_drivers_and_bridges_make_it() -> None:
+    odd = [SimpleNamespace(name=n, offset=12, datatype=7, count=1) for n in ("rgb", "rgb", "", "")]
+    message = cloud2("<", 1)
+    message.fields += odd
+    same(message, F)
+    message.data = base64.b64encode(message.data).decode()  # rosbridge
+    same(message, F)
+    table = {**vars(message), "fields": [vars(each) for each in message.fields]}
+    same(table, F)
+    same({**table, "data": base64.b64decode(message.data)}, F)
+    assert "are text, but not base64: 'no'" in refused({**table, "data": "no"})
+    together = cloud2("<", 1)
+    together.fields = [SimpleNamespace(name="xyz", offset=0, datatype=7, count=3)]
+    same(together, F)
+    message.fields[2].offset = 18
+    assert "correct their offsets" in refused(message)
+
+
+def test_point_cloud_2_whose_row_step_is_that_of_all_rows() -> None:
+    whole = cloud2("<", 1)
+    whole.data = whole.data[: 60 * 20]
+    whole.height, whole.width, whole.row_step = 4, 15, len(whole.data)
+    same(whole, F)
+    whole.data = whole.data[:-1]
+    assert "holds 1199 bytes" in refused(whole)
 
 
 def test_pandas() -> None:
@@ -254,6 +445,58 @@ def test_small_gicp_and_plyfile() -> None:
     element = plyfile.PlyElement.describe(record(("z", "f8"), ("y", "f8"), ("x", "f8")), "vertex")
     same(element)
     same(plyfile.PlyData([element]))
+
+
+def test_a_column_of_lists(tmp_path: Any) -> None:
+    pd, pl, pa = (pytest.importorskip(each) for each in ("pandas", "polars", "pyarrow"))
+    same(pd.DataFrame({"time": P[:, 0], "xyz": list(P)}))
+    same(pl.DataFrame({"xyz": P.tolist()}))
+    same(pl.DataFrame({"points": P}))
+    table = pa.table({"pts": pa.FixedSizeListArray.from_arrays(pa.array(P.ravel()), 3)})
+    same(table)
+    pytest.importorskip("pyarrow.parquet").write_table(table, tmp_path / "a.parquet")
+    same(tmp_path / "a.parquet")
+    assert "hold from 2 to 3 numbers" in refused(pd.DataFrame({"xyz": [*P[1:].tolist(), [1.0, 2.0]]}))
+    assert "not finite" in refused(pa.table({"xyz": [*P[1:].tolist(), None]}))
+    assert "name the coordinates" in refused(pl.DataFrame({"quaternion": [[0.0, 0.0, 0.0, 1.0]] * 60}))
+    assert "something else than numbers" in refused(pd.DataFrame({"xyz": [["a", "b", "c"]] * 60}))
+    assert "name the coordinates" in refused(pl.DataFrame({"p": [{"z": 1.0, "y": 2.0, "x": 3.0}] * 60}))
+
+
+def test_arrays_x_y_and_z_of_an_archive(tmp_path: Any) -> None:
+    np.savez(tmp_path / "a.npz", x=P[:, 0], y=P[:, 1], z=P[:, 2], time=P[:, 0], T=np.eye(4))
+    same(tmp_path / "a.npz")
+    np.savez(tmp_path / "b.npz", cloud=record(("z", "f8"), ("y", "f8"), ("x", "f8")))
+    same(tmp_path / "b.npz")
+
+
+def test_vtk() -> None:
+    core, data = (pytest.importorskip(f"vtkmodules.vtkCommon{each}") for each in ("Core", "DataModel"))
+    convert = pytest.importorskip("vtkmodules.util.numpy_support").numpy_to_vtk
+    points = core.vtkPoints()
+    points.SetData(convert(P, deep=True))
+    cloud = data.vtkPolyData()
+    cloud.SetPoints(points)
+    same(points)
+    same(cloud)
+    faces = data.vtkCellArray()
+    faces.InsertNextCell(3)
+    for corner in range(3):
+        faces.InsertCellPoint(corner)
+    cloud.SetPolys(faces)
+    assert "x.GetPoints()" in refused(cloud)
+    same(cloud.GetPoints())
+    assert "empty" in refused(data.vtkPolyData())
+
+
+def test_a_scene_of_clouds_alone() -> None:
+    trimesh = pytest.importorskip("trimesh")
+    scene = trimesh.Scene()
+    place = trimesh.transformations.translation_matrix([10, 0, 0])
+    scene.add_geometry(trimesh.PointCloud(P), transform=place)
+    same(scene, P + [10, 0, 0])
+    scene.add_geometry(trimesh.creation.box())
+    assert "a scene is not a cloud" in refused(scene)
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hybridreg.io.formats.pcd import parse_pcd
+from hybridreg.io.formats.pcd import parse_pcd, pcd_viewpoint
 
 CODES = {word: f"<{word.lower()}" for word in ("F4", "F8", "I1", "I2", "I4", "I8", "U1", "U2", "U4", "U8")}
 
@@ -156,3 +156,25 @@ def test_bad_file(message):
     with pytest.raises(ValueError, match=r"a\.pcd: ") as caught:
         parse_pcd(BAD[message], "a.pcd")
     assert message in str(caught.value)
+
+
+@pytest.mark.parametrize("encoding", ["ascii", "binary", "binary_compressed"])
+def test_one_field_that_holds_all_three_coordinates(encoding):
+    points = np.random.default_rng(0).normal(size=(30, 3)).astype("<f4")
+    times = np.arange(30, dtype="<f4")
+    if encoding == "ascii":
+        body = "".join(f"{t} {x!r} {y!r} {z!r}\n" for t, (x, y, z) in enumerate(points.tolist())).encode()
+    elif encoding == "binary":
+        body = np.column_stack([times, points]).tobytes()
+    else:
+        raw = times.tobytes() + points.tobytes()
+        body = sizes(len(literal_lzf(raw)), len(raw)) + literal_lzf(raw)
+    told = header(30, encoding, FIELDS="t xyz", SIZE="4 4", TYPE="F F", COUNT="1 3")
+    np.testing.assert_array_equal(parse_pcd(told + body, "a.pcd"), points)
+
+
+def test_a_unit_in_a_comment_is_believed_and_told_for_the_viewpoint_too():
+    data = b"# unit: mm\n" + header(1, "ascii", VIEWPOINT="500 0 0 1 0 0 0") + b"1500 2000 3000\n"
+    with pytest.warns(UserWarning, match=r"a\.pcd: its own header says that its unit is 0\.001 m"):
+        np.testing.assert_allclose(parse_pcd(data, "a.pcd"), [[1.5, 2, 3]])
+    np.testing.assert_allclose(pcd_viewpoint(data, "a.pcd"), [0.5, 0, 0])

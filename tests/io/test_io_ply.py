@@ -183,3 +183,27 @@ def test_ascii_list_without_length():
     head = header("element vertex 1", "property list uchar int a", AXES.rstrip(), word="ascii")
     with pytest.raises(ValueError, match="no length"):
         parse_ply(head + b"-1 2 3 4 5\n", "a.ply")
+
+
+def test_names_of_several_words_as_cloudcompare_writes_them():
+    xyz = [f"property float {axis}" for axis in "xyz"]
+    data = header("element vertex 2", *xyz, "property float scalar_Scan Angle", word="ascii")
+    np.testing.assert_array_equal(parse_ply(data + b"1 2 3 9\n4 5 6 9\n", "a.ply"), [[1, 2, 3], [4, 5, 6]])
+
+
+@pytest.mark.parametrize("keyword", ["comment", "obj_info"])
+def test_a_unit_in_a_comment_is_believed_and_told(keyword):
+    data = header(f"{keyword} unit: mm", "element vertex 1", *AXES.splitlines()) + struct.pack(
+        "<3f", 1500, 2000, 3000
+    )
+    with pytest.warns(UserWarning, match=r"a\.ply: its own header says that its unit is 0\.001 m"):
+        np.testing.assert_allclose(parse_ply(data, "a.ply"), [[1.5, 2, 3]])
+
+
+def test_two_elements_of_vertices_are_refused():
+    axes = AXES.splitlines()
+    data = header("element vertex 1", *axes, "element Vertex 2", *axes) + struct.pack("<9f", *range(9))
+    with pytest.raises(
+        ValueError, match=r"a\.ply: has 2 elements 'vertex', of 1 and 2 points; export them as one"
+    ):
+        parse_ply(data, "a.ply")

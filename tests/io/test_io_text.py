@@ -32,7 +32,16 @@ ACCEPTED = {
     "spaced names with units": "x [m] y [m] z [m]\n1.5 2 3\n-4 5.25 6e3\n7 8 -9\n",
     "commented names": "//X Y Z R G B\n1.5 2 3 1 1 1\n-4 5.25 6e3 1 1 1\n7 8 -9 1 1 1\n",
     "commented names elsewhere": "# scan 4\n# z,x,y\n3,1.5,2\n6e3,-4,5.25\n-9,7,8\n",
+    "a comment after the names": "# z,x,y\n# units: m\n# exported by hand\n#\n3,1.5,2\n6e3,-4,5.25\n-9,7,8\n",
+    "a title before the names": "# columns: id z x y\n0 3 1.5 2\n0 6e3 -4 5.25\n0 -9 7 8\n",
+    "a title without a space": "#Format: i x y z\n# points: 3\n5 1.5 2 3\n5 -4 5.25 6e3\n5 7 8 -9\n",
+    "names of tools in a comment": "# t,point_x,point_y,point_z\n0,1.5,2,3\n0,-4,5.25,6e3\n0,7,8,-9\n",
+    "names with commas, numbers with spaces": "# t, z, y, x\n0 3 2 1.5\n0 6e3 5.25 -4\n0 -9 8 7\n",
+    "prose with the names of axes": "# z is up and x east, y north\n1.5 2 3 9\n-4 5.25 6e3 9\n7 8 -9 9\n",
     "count first": "3\n1.5 2 3 9\n-4 5.25 6e3 9\n7 8 -9 9\n",
+    "blocks with counts": "1\n1.5 2 3\n2\n-4 5.25 6e3\n7 8 -9\n",
+    "blocks with counts and commas": "1\n1.5,2,3\n1\n-4,5.25,6e3\n1\n7,8,-9\n",
+    "Excel's separator": "sep=;\nx;y;z\n1,5;2;3\n-4;5,25;6e3\n7;8;-9\n",
     "byte order mark": "\ufeff1.5 2 3\n-4 5.25 6e3\n7 8 -9\n",
     "foreign letters": "# Straße 9, données\n1.5 2 3\n-4 5.25 6e3\n7 8 -9\n",
 }
@@ -65,6 +74,9 @@ REFUSED = {
     "0 fields called 'x' among 'east, north, up'": "east,north,up\n1,2,3\n",
     "2 fields called 'x'": "x,x,y,z\n1,2,3,4\n",
     "promises '4' points, 3 rows follow": "4\n1 2 3\n1 2 3\n1 2 3\n",
+    "row 3 promises '2' points, 1 rows follow": "1\n1 2 3\n2\n1 2 3\n",
+    "is a PTX scan": "9\n1\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n1 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 0 1\n"
+    + "1 2 3 0.5\n" * 9,
     "2 lines and none of numbers": "# nothing\n# here\n",
     "0 lines": "\n \n",
     "zero bytes": "\ufeff1 2 3\n".encode("utf-16-le"),
@@ -91,7 +103,15 @@ UNITS = {
     "first returns": "RANGE1 (mm),X1 (mm),Y1 (mm),Z1 (mm)\n1,1500,2000,3000\n1,-4000,5250,6e6\n1,7000,8000,-9000\n",
     "x/mm": "x/mm,y/mm,z/mm\n1500,2000,3000\n-4000,5250,6e6\n7000,8000,-9000\n",
     "commented": "# scan 4\n# x(mm) y(mm) z(mm)\n1500 2000 3000\n-4000 5250 6e6\n7000 8000 -9000\n",
+    "one unit for all": "# x y z (mm)\n1500 2000 3000\n-4000 5250 6e6\n7000 8000 -9000\n",
+    "commented x_mm": "# x_mm y_mm z_mm\n# 3 points\n1500 2000 3000\n-4000 5250 6e6\n7000 8000 -9000\n",
+    "first returns too": "# T,X1 (mm), Y1 (mm), Z1 (mm)\n1,1500,2000,3000\n1,-4000,5250,6e6\n1,7000,8000,-9000\n",
     "unit: mm": "# unit: mm\n1500 2000 3000\n-4000 5250 6e6\n7000 8000 -9000\n",
+    "length_unit": "# length_unit: mm\n1500 2000 3000\n-4000 5250 6e6\n7000 8000 -9000\n",
+    "coordinates in mm": "# all coordinates in mm\n1500 2000 3000\n-4000 5250 6e6\n7000 8000 -9000\n",
+    "given in millimetres": "# Coordinates given in millimetres.\n1500 2000 3000\n-4000 5250 6e6\n7000 8000 -9000\n",
+    "[mm]": "# [mm]\n1500 2000 3000\n-4000 5250 6e6\n7000 8000 -9000\n",
+    "LOCAL_CS": '# LOCAL_CS["L (mm)",UNIT["millimetre",0.001]]\n1500 2000 3000\n-4000 5250 6e6\n7000 8000 -9000\n',
     "units are centimetres": "// Units are centimetres\n150 200 300\n-400 525 6e5\n700 800 -900\n",
 }
 
@@ -108,6 +128,37 @@ def test_feet(feet, metres):
     with pytest.warns(UserWarning, match=r"0\.3048"):
         points = parse_text(f"x ({feet}),y ({feet}),z ({feet})\n1,2,3\n4,5,6\n".encode(), "a.csv")
     np.testing.assert_allclose(points, np.array([[1, 2, 3], [4, 5, 6]]) * metres)
+
+
+def test_feet_and_inches_in_a_comment():
+    for comment, metres in (
+        ("Units: US survey feet", 1200 / 3937),
+        ("unit: inch", 0.0254),
+        ("unit: in", 0.0254),
+    ):
+        with pytest.warns(UserWarning, match="its unit is 0"):
+            points = parse_text(f"# {comment}\n1 2 3\n4 5 6\n".encode(), "a.txt")
+        np.testing.assert_allclose(points, np.array([[1, 2, 3], [4, 5, 6]]) * metres)
+
+
+def test_a_scale_is_told():
+    with pytest.warns(UserWarning, match=r"a\.txt: its header says 'scale: 0\.001', which was not applied"):
+        np.testing.assert_array_equal(parse_text(b"# scale: 0.001\n1 2 3\n", "a.txt"), [[1, 2, 3]])
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize(
+    "comment",
+    [
+        "angle_unit: deg",
+        "range unit: mm",
+        "unit 7",
+        "scale: 1.0",
+        'PROJCS["U",GEOGCS["W",UNIT["degree",0.0]],UNIT["metre",1]]',
+    ],
+)
+def test_comments_that_give_no_other_unit(comment):
+    np.testing.assert_array_equal(parse_text(f"# {comment}\n1 2 3\n".encode(), "a.txt"), [[1, 2, 3]])
 
 
 HEADS = {
@@ -130,10 +181,13 @@ def test_heads_of_tools(style):
 
 REFUSED_HEADS = {
     "in 'deg'": "x (deg),y (deg),z (m)\n1,2,3\n",
+    "is 'degrees'": "# units: degrees\n7.1 50.7 100\n",
+    "is 'degree'": '# GEOGCS["WGS 84",UNIT["degree",0.0174]]\n7.1 50.7 100\n',
     "differ: mm, mm, m": "x (mm),y (mm),z (m)\n1,2,3\n",
     "longitudes and latitudes": "lon,lat,h\n7.1,50.7,100\n",
     "several columns that could be": "pos_x,pos_y,pos_z,lidar_x,lidar_y,lidar_z\n1,2,3,4,5,6\n",
     "grid of heights": "ncols 3\nnrows 2\nxllcorner 0\nyllcorner 0\ncellsize 1\n1 2 3\n4 5 6\n",
+    "25 x 64 numbers are an image": ("1.5 " * 64 + "\n") * 25,
     "is a row number": "".join(f"{k} 1.5 2.5 {k * k}\n" for k in range(30)),
 }
 
@@ -143,3 +197,44 @@ def test_refused_heads(message):
     with pytest.raises(ValueError, match=r"a\.txt: ") as caught:
         parse_text(REFUSED_HEADS[message].encode(), "a.txt")
     assert message in str(caught.value)
+
+
+ROWS = "1.5,2,3\n4,5,6\n7,8,9\n"
+FIRST_ROWS = {
+    "its first row holds no numbers, so that it was read as the names of the columns: it has 0 fields called 'x' among "
+    "'Rechtswert, Hochwert, Höhe'; name the coordinates": f"Rechtswert,Hochwert,Höhe\n{ROWS}",
+    "read as the names of the columns: it has 0 fields called 'x' among 'E, N, H'": f"E,N,H\n{ROWS}",
+    "its first 3000 rows hold no points, from 'key0: value' on; begin those that are comments with #": "".join(
+        f"key{k}: value\n" for k in range(3000)
+    )
+    + ROWS,
+    "its first row, '! Leica', is no comment; begin comments with #": f"! Leica\n{ROWS}",
+    'its first row, "\' Trimble", is no comment': f"' Trimble\n{ROWS}",
+    "its numbers are separated by ':': '1:2:3'": "1:2:3\n" * 30,
+    "its numbers are separated by '|': '1.5|2|3'; separate them by": ROWS.replace(",", "|"),
+    "have a D before their exponents: '2.8D+01 1.0D+00 0.5D+00'; write an E": "2.8D+01 1.0D+00 0.5D+00\n"
+    * 30,
+}
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "latin-1"])
+@pytest.mark.parametrize("message", FIRST_ROWS)
+def test_a_first_row_without_numbers_is_named_as_the_cause(message, encoding):
+    with pytest.raises(ValueError, match=r"a\.txt: ") as caught:
+        parse_text(FIRST_ROWS[message].encode(encoding), "a.txt")
+    assert message in str(caught.value)
+
+
+def test_a_range_first_is_refused_and_a_ring_first_is_told():
+    points = np.random.default_rng(0).normal(size=(60, 3)) * [9, 9, 1]
+    ranges = np.linalg.norm(points, axis=1)
+    with pytest.raises(ValueError, match=r"a\.csv: .*length of the next three.*id x y z"):
+        parse_text(
+            "".join(f"{r},{x},{y},{z}\n" for r, (x, y, z) in zip(ranges, points, strict=True)).encode(),
+            "a.csv",
+        )
+    rows = "".join(f"{k % 16};{x};{y};{z};car\n" for k, (x, y, z) in enumerate(points))
+    with pytest.warns(UserWarning, match=r"a\.csv: .*16 whole numbers, like a ring.*id x y z"):
+        parse_text(rows.encode(), "a.csv")
+    named = parse_text(f"id;x;y;z;kind\n{rows}".encode(), "a.csv")
+    np.testing.assert_array_equal(named, points)

@@ -42,6 +42,27 @@ VALUES = (
     (r"\baccelerator='(\w+)': ", r"--accelerator \1: "),
     (r"\bpreset='(.*)' and pipeline='(.*)': ", r"--preset \1 and --pipeline \2: "),
 )
+# What to do with an array: on the command line it lies in a file.
+ARRAYS = (
+    (r"convert with astype\(float\)", "save the file again with x.astype(float) of its array x"),
+    (r"take the real part: x\.real", "save the file again with the real part of its array x: x.real"),
+    (
+        r"pass one of them, x\[0\], or all as one cloud, x\.reshape\(-1, 3\)",
+        "of the file's array x, save one, x[0], to a file of its own, or all as one cloud, x.reshape(-1, 3)",
+    ),
+    (r"one point after another: x\.reshape", "one point after another, save the file again with x.reshape"),
+    (r"transpose and choose: x\[:3\]\.T", "save the file again with x[:3].T of its array x"),
+    (
+        r"needs three coordinates: numpy\.column_stack\(\[x, y, z\]\)",
+        "needs three coordinates: save the file again with x, y and z of each point",
+    ),
+    (r"give one row a point: numpy\.column_stack\(\[x, y, z\]\)", "save the file again with one row x, y, z a point"),
+    (
+        r"give an array of numbers, one point a row: numpy\.column_stack\(\[x, y, z\]\)",
+        "save the file again as an array of numbers, one row x, y, z a point",
+    ),
+    (r"leave it out: give columns 2 to 4", "leave it out: save the file again with columns 2 to 4"),
+)  # fmt: skip
 
 
 def spoken(text: str) -> str:
@@ -54,6 +75,8 @@ def spoken(text: str) -> str:
         text = text if fit is None else re.sub(said, fit, text)
     for said, named in VALUES:
         text = re.sub(said, named, text) if options_in(named) <= given else text
+    for said, at_file in ARRAYS:
+        text = re.sub(said, at_file, text)
     return text
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Headerless float32 rows: three numbers a point (as PointNet has), four (KITTI), five (nuScenes) or six (Waymo)."""
+"""Headerless float32 rows: three numbers a point (PointNet), four (KITTI), five (nuScenes), six (Waymo) or more."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybridreg.io.faults import fault
+from hybridreg.io.formats.bin_layouts import are_channels, rows_together, wider
 from hybridreg.io.record_fields import stack_axes
 from hybridreg.io.signatures import looks_like_text
 
@@ -29,7 +30,8 @@ _BLOCK = 60  # numbers, a multiple of every width
 
 
 def parse_bin(data: bytes, name: str) -> NDArray[np.float64]:
-    """Read x, y and z of float32 rows of three to six numbers; values after z are ignored. Shape (N, 3).
+    """Read x, y and z of float32 rows of three to six numbers, or of up to sixteen where those clearly fit better;
+    values after z are ignored. Shape (N, 3).
 
     Only at the right width do columns differ: x is distributed differently from z, an intensity differently from both,
     while at a wrong width each column is the same mixture of all. The narrowest width at which they differ most is
@@ -55,7 +57,14 @@ def parse_bin(data: bytes, name: str) -> NDArray[np.float64]:
         problem = f"its {len(data)} bytes are no multiple of {sizes} (three to six float32 a point)"
         raise fault(name, problem, f"it was cut short, or has another layout: {_NO_HEADER}")
     width = told or (possible[0] if len(possible) == 1 else _width_by_values(data, possible, likely, name))
+    numbers = np.frombuffer(data, dtype="<f4", count=len(data) // 4)
+    if are_channels(numbers, width, _contrast):
+        problem = f"its {len(data) // 4} numbers come channel after channel, not in rows"
+        cure = "save numpy.fromfile(path, 'float32').reshape(4, -1).T, or as many as it has channels, as .npy"
+        raise fault(name, problem, cure)
+    width = wider(numbers, width, _contrast)
     rows = _rows(data, width)
+    rows = _rows(data, width * rows_together(rows))
     _refuse_implausible(rows, name)
     return stack_axes(rows[:, 0], rows[:, 1], rows[:, 2])
 

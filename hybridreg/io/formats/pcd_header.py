@@ -32,6 +32,7 @@ class PcdHeader:
     encoding: str
     body: int  # the first byte after the header
     viewpoint: tuple[float, float, float] | None  # the sensor's position; None where it is not given
+    comments: tuple[str, ...] = ()
 
     @property
     def sizes(self) -> tuple[int, ...]:
@@ -41,7 +42,7 @@ class PcdHeader:
 
 def parse_pcd_header(data: bytes, name: str) -> PcdHeader:
     """Read the header of the PCD file `data` called `name`."""
-    entries, body = _entries(data, name)
+    entries, comments, body = _entries(data, name)
     fields = entries.get("FIELDS") or entries.get("COLUMNS") or []
     if not fields:
         raise fault(name, "its header has no FIELDS")
@@ -59,11 +60,13 @@ def parse_pcd_header(data: bytes, name: str) -> PcdHeader:
         encoding=encoding,
         body=body,
         viewpoint=_viewpoint(entries.get("VIEWPOINT", []), name),
+        comments=tuple(comments),
     )
 
 
-def _entries(data: bytes, name: str) -> tuple[dict[str, list[str]], int]:
+def _entries(data: bytes, name: str) -> tuple[dict[str, list[str]], list[str], int]:
     entries: dict[str, list[str]] = {}
+    comments: list[str] = []
     start = 0
     while "DATA" not in entries:
         newline = data.find(b"\n", start)
@@ -76,7 +79,9 @@ def _entries(data: bytes, name: str) -> tuple[dict[str, list[str]], int]:
             entries[keyword.upper()] = values
         elif not keyword.startswith("#"):
             raise fault(name, f"its header has the unknown line {shorten(line)}")
-    return entries, start
+        else:
+            comments.append(line.lstrip("# "))
+    return entries, comments, start
 
 
 def _per_field(entries: dict[str, list[str]], keyword: str, fields: int, name: str) -> list[str]:

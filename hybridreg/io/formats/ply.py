@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from hybridreg.io.faults import fault
 from hybridreg.io.formats.ply_header import Element, PlyHeader, Property, parse_ply_header
 from hybridreg.io.formats.text_rows import parse_rows, promised_lines, text_lines
+from hybridreg.io.meaning.length_units import as_commented
 from hybridreg.io.record_fields import XyzRecord, axis_columns
 
 _STRUCT_CODES = {"i1": "b", "u1": "B", "i2": "h", "u2": "H", "i4": "i", "u4": "I", "i8": "q", "u8": "Q",
@@ -20,11 +21,16 @@ _EXPORT_CLOUD = "export the file with x, y and z as single numbers of each verte
 
 
 def parse_ply(data: bytes, name: str) -> NDArray[np.float64]:
-    """Read x, y and z of the vertices of a PLY file: ascii, little or big endian; shape (N, 3).
+    """Read x, y and z of the vertices of a PLY file: ascii, little or big endian; shape (N, 3), metres where a
+    comment gives another unit.
 
     Source: Turk, "The PLY polygon file format" (1994).
     """
     header = parse_ply_header(data, name)
+    return as_commented(_points(data, header, name), header.comments, name)
+
+
+def _points(data: bytes, header: PlyHeader, name: str) -> NDArray[np.float64]:
     before, vertex = _split_at_vertex(header, name)
     columns = axis_columns([field.name for field in vertex.properties], name)
     if any(vertex.properties[column].length_code for column in columns):
@@ -38,9 +44,12 @@ def parse_ply(data: bytes, name: str) -> NDArray[np.float64]:
 
 
 def _split_at_vertex(header: PlyHeader, name: str) -> tuple[tuple[Element, ...], Element]:
-    for index, element in enumerate(header.elements):
-        if element.name.lower() == "vertex":
-            return header.elements[:index], element
+    places = [k for k, element in enumerate(header.elements) if element.name.lower() == "vertex"]
+    if len(places) > 1:
+        counts = " and ".join(str(header.elements[k].count) for k in places[:5])
+        raise fault(name, f"has {len(places)} elements 'vertex', of {counts} points", "export them as one")
+    if places:
+        return header.elements[: places[0]], header.elements[places[0]]
     names = ", ".join(element.name for element in header.elements[:10]) or "nothing"
     raise fault(name, f"has no element 'vertex', only {names}", "export the file with its vertices")
 

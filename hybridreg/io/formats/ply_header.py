@@ -47,6 +47,7 @@ class PlyHeader:
     order: str  # "<" or ">", empty for ascii
     elements: tuple[Element, ...]
     body: int
+    comments: tuple[str, ...] = ()
 
 
 def parse_ply_header(data: bytes, name: str) -> PlyHeader:
@@ -57,6 +58,7 @@ def parse_ply_header(data: bytes, name: str) -> PlyHeader:
     order = ""
     seen_format = False
     elements: list[Element] = []
+    comments: list[str] = []
     for line in lines[1:]:
         words = line.split()
         keyword = words[0] if words else "comment"
@@ -66,11 +68,13 @@ def parse_ply_header(data: bytes, name: str) -> PlyHeader:
             elements.append(_element(words, name))
         elif keyword == "property":
             _append_property(elements, words, name)
-        elif keyword not in ("comment", "obj_info"):
+        elif keyword in ("comment", "obj_info"):
+            comments.append(line.strip()[len(keyword) :].strip())
+        else:
             raise fault(name, f"its header has the unknown line {shorten(line)}")
     if not seen_format:
         raise fault(name, "its header has no 'format' line")
-    return PlyHeader(order=order, elements=tuple(elements), body=body)
+    return PlyHeader(order=order, elements=tuple(elements), body=body, comments=tuple(comments))
 
 
 def _header_lines(data: bytes, name: str) -> tuple[list[str], int]:
@@ -106,10 +110,12 @@ def _append_property(elements: list[Element], words: list[str], name: str) -> No
 
 
 def _property(words: list[str], name: str) -> Property:
-    *types, label = words[1:] or [""]
-    is_list = types[:1] == ["list"]
-    codes = [_TYPES.get(word, "") for word in types[is_list:]]
-    if len(codes) != 1 + is_list or "" in codes or (is_list and codes[0].startswith("f")):
+    is_list = words[1:2] == ["list"]
+    first = 1 + is_list
+    # CloudCompare's scalar fields have names of several words.
+    types, label = words[first : first + 1 + is_list], " ".join(words[first + 1 + is_list :])
+    codes = [_TYPES.get(word, "") for word in types]
+    if not label or "" in codes or (is_list and codes[0].startswith("f")):
         problem = f"its header line {shorten(' '.join(words))} is not a property of a known type"
         raise fault(name, problem, f"known types are {', '.join(_TYPES)}")
     return Property(name=label, code=codes[-1], length_code=codes[0] if is_list else "")

@@ -8,13 +8,18 @@ import re
 import numpy as np
 from numpy.typing import NDArray
 
-from hybridreg.io.arrays import counts_up
-from hybridreg.io.column_names import Axes, axes_in, unit_said
-from hybridreg.io.faults import fault, shorten
-from hybridreg.io.formats.text_rows import parse_rows, text_lines
+from hybridreg.io.column_names import Axes
+from hybridreg.io.faults import fault
+from hybridreg.io.formats.text_first_row import axes_of_first_row
+from hybridreg.io.formats.text_names import axes_in_comments, is_number, names_in
+from hybridreg.io.formats.text_rows import parse_rows, text_lines, without_counts
+from hybridreg.io.meaning.first_column import check_first_column, looked_at, refuse_row_numbers
+from hybridreg.io.meaning.image_shapes import refuse_image
+from hybridreg.io.meaning.length_units import as_commented, in_metres
 from hybridreg.io.signatures import looks_binary
 
 _COMMENTS = ("#", "//", "%", ";")
+_EXCEL = "sep="  # the row that tells Excel the separator
 _DECIMAL_COMMA = re.compile(r"[-+]?\d+(,\d+)?([eE][-+]?\d+)?")
 _POSITION = Axes((0, 1, 2))
 
@@ -22,10 +27,10 @@ _POSITION = Axes((0, 1, 2))
 def parse_text(data: bytes, name: str) -> NDArray[np.float64]:
     """Read x, y and z of text rows separated by spaces, tabs, commas or semicolons; shape (N, 3), metres.
 
-    Lines that begin with `#`, `//`, `%` or `;` are comments. A first row of names (CloudCompare puts it
-    behind a comment mark) tells which columns are x, y and z, and perhaps their unit; otherwise the first three are. A
-    first row of one whole number (PTS, XYZ) is the number of points and must be right. A comma is a decimal point
-    where something else separates the numbers.
+    Lines that begin with `#`, `//`, `%` or `;` are comments. A first row of names, or a comment of names before it,
+    tells which columns are x, y and z, and perhaps their unit; otherwise the first three are. A first row of one whole
+    number (PTS, XYZ) is the number of points and must be right; such a row with its points may follow again. A comma is
+    a decimal point where something else separates the numbers.
 
     Raises
     ------
@@ -37,6 +42,8 @@ def parse_text(data: bytes, name: str) -> NDArray[np.float64]:
     lines = [line.strip(" ") for line in text_lines(data.removeprefix(b"\xef\xbb\xbf"))]
     first = next((index for index, line in enumerate(lines) if not line.startswith(_COMMENTS)), len(lines))
     rows = [line for line in lines[first:] if not line.startswith(_COMMENTS)]
+    if rows and rows[0].lower().startswith(_EXCEL):
+        rows = rows[1:]
     if not rows:
         raise fault(name, f"has {len(lines)} lines and none of numbers", "check that the export was complete")
     if rows[0].lower().startswith("ncols"):
@@ -45,33 +52,41 @@ def parse_text(data: bytes, name: str) -> NDArray[np.float64]:
             "is a grid of heights (ESRI), not of points",
             "convert it: gdal_translate -of XYZ in.asc out.xyz",
         )
-    delimiter, comma = _delimiter(
-        rows[len(rows) // 2]
-    )  # not the first, which may be names, nor a cut-off last
-    axes = _POSITION
-    named = _names(rows[0], delimiter)
-    if named:
-        axes = axes_in(named, name)
-        rows = rows[1:]
-    elif first and (named := _commented_names(lines[first - 1], delimiter)):
-        axes = axes_in(named, name)
-    rows = _counted(rows, name)
-    points = parse_rows(
-        [row.replace(",", ".") for row in rows] if comma else rows, axes.columns, name, delimiter
-    )
-    if not named and counts_up(points[:, 0]) and len(rows[0].split(delimiter)) > 3:
-        cure = "name the columns in a first row, such as: id x y z"
-        raise fault(name, "its first column is a row number, not a coordinate", cure)
-    return _in_metres(points, axes, lines[:first], name)
+    delimiter, comma = _delimiter(_typical(rows))
+    names = names_in(rows[0], delimiter)
+    of_names = axes_of_first_row(rows, names, name) if names else None
+    rows = without_counts(rows[1:] if names else rows, name)
+    width = len(rows[0].split(delimiter)) if rows else 0
+    named = of_names or axes_in_comments(lines[:first], delimiter, width, name)
+    if named is None:
+        refuse_image(len(rows), width, name)
+    axes = named or _POSITION
+    rows = [row.replace(",", ".") for row in rows] if comma else rows
+    points = parse_rows(rows, axes.columns, name, delimiter)
+    if named is None:
+        _check_first(points, rows, delimiter, name)
+    if axes.metres != 1.0:
+        return in_metres(points, axes.metres, name)
+    return as_commented(points, lines[:first], name)
 
 
-def _in_metres(
-    points: NDArray[np.float64], axes: Axes, comments: list[str], name: str
-) -> NDArray[np.float64]:
-    said = next((metres for line in comments if (metres := unit_said(line)) != 1.0), 1.0)
-    axes = axes._replace(metres=said) if axes.metres == 1.0 else axes
-    axes.tell(name)
-    return points if axes.metres == 1.0 else points * axes.metres
+def _check_first(points: NDArray[np.float64], rows: list[str], delimiter: str | None, name: str) -> None:
+    """Whether the first column of rows without names, which became x of `points` (N, 3), is one."""
+    words = rows[0].split(delimiter) if rows else []
+    width = next((k for k, word in enumerate(words) if not is_number(word)), len(words))
+    if width <= 3:
+        return
+    cure = "name the columns in a first row, such as: id x y z"
+    refuse_row_numbers(points[:, 0], name, cure)
+    some = [rows[k].split(delimiter)[:width] for k in looked_at(len(rows))]
+    whole = [row for row in some if len(row) == width and all(map(is_number, row))]
+    check_first_column(np.array(whole, dtype=np.float64).reshape(-1, width), name, cure)
+
+
+def _typical(rows: list[str]) -> str:
+    # Not the first, which may be names, nor a cut-off last, nor a number of points.
+    middle = len(rows) // 2
+    return next((row for row in rows[middle:] if not row.isdecimal()), rows[middle])
 
 
 def _delimiter(row: str) -> tuple[str | None, bool]:
@@ -82,38 +97,3 @@ def _delimiter(row: str) -> tuple[str | None, bool]:
     if "," in row and len(words) >= 3 and all(_DECIMAL_COMMA.fullmatch(word.strip()) for word in words[:3]):
         return ("\t" if "\t" in row else None), True
     return next((mark for mark in (",", "\t") if mark in row), None), False
-
-
-def _names(row: str, delimiter: str | None) -> list[str]:
-    """The names in a row of names, with their units and without quotes; none if it is a row of numbers."""
-    if delimiter is None:  # a unit belongs to the name before it
-        row = re.sub(r"\s+(?=[\[(])", "", row)
-    words = [word.strip().strip("\"'").strip() for word in row.split(delimiter)]
-    return [] if any(_is_number(word.replace(",", ".")) for word in words) else words
-
-
-def _commented_names(line: str, delimiter: str | None) -> list[str]:
-    # Most comments are prose: only one that has an x, a y and a z is taken for the names of the columns.
-    words = line.lstrip("#/%; ")
-    for mark in (delimiter, None):
-        names = _names(words, mark)
-        if {"x", "y", "z"} <= {re.sub(r"\s*[\[(].*", "", label).lower() for label in names}:
-            return names
-    return []
-
-
-def _is_number(word: str) -> bool:
-    try:
-        float(word)
-    except ValueError:
-        return False
-    return True
-
-
-def _counted(rows: list[str], name: str) -> list[str]:
-    if len(rows) < 2 or not rows[0].isdecimal():
-        return rows
-    if int(rows[0][:18]) != len(rows) - 1:
-        problem = f"its first row promises {shorten(rows[0])} points, {len(rows) - 1} rows follow"
-        raise fault(name, problem)
-    return rows[1:]

@@ -8,10 +8,17 @@ from numpy.typing import NDArray
 
 from hybridreg.io.faults import fault, shorten
 
+# Values in the rows behind a PTX scan's two counts: the scanner's place and axes, and a matrix.
+_PTX = [3, 3, 3, 3, 4, 4, 4, 4]
+
 
 def text_lines(data: bytes) -> list[str]:
-    """The lines that are not empty; bytes that are not ASCII survive in comments and names as Latin-1."""
-    lines = data.decode("latin-1").replace("\r", "\n").split("\n")
+    """The lines that are not empty, in UTF-8 where they are so, and in Latin-1, which reads any bytes, otherwise."""
+    try:
+        text = data.decode("utf-8")
+    except UnicodeDecodeError:
+        text = data.decode("latin-1")
+    lines = text.replace("\r", "\n").split("\n")
     return [line for line in lines if line and not line.isspace()]
 
 
@@ -24,6 +31,25 @@ def promised_lines(lines: list[str], start: int, count: int, width: int, name: s
         held = len(rows[-1].split())
         raise fault(name, f"its last point has {held} of {width} values: {shorten(rows[-1])}")
     return rows
+
+
+def without_counts(rows: list[str], name: str) -> list[str]:
+    """The rows of points of one or several blocks (PTS), each behind a row with the number of its points."""
+    if len(rows) < 2 or not rows[0].isdecimal():
+        return rows
+    if rows[1].isdecimal() and [len(row.split()) for row in rows[2:10]] == _PTX:
+        cure = "export it as .ply or .pts, for example with CloudCompare"
+        raise fault(name, "is a PTX scan: the scanner's pose stands before its points", cure)
+    kept: list[str] = []
+    begin = start = 0
+    while start < len(rows) and rows[start].isdecimal():
+        begin, start = start, start + 1 + int(rows[start][:18])
+        kept.extend(rows[begin + 1 : start])
+    if start == len(rows):
+        return kept
+    which = f"row {begin + 1}" if begin else "first row"
+    held = f"{len(rows) - begin - 1} rows follow"
+    raise fault(name, f"its {which} promises {shorten(rows[begin])} points, {held}")
 
 
 def parse_rows(

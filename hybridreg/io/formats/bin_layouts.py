@@ -1,0 +1,92 @@
+# SPDX-License-Identifier: MIT
+"""Layouts of headerless float32 files beyond rows of three to six numbers: wider rows, and channel after channel."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+Numbers = NDArray[np.float32]
+Contrast = Callable[[Numbers, int], float]
+
+_WIDEST = 16  # numbers a row: PCL's points have up to twelve
+_FEWEST = 20  # rows of each part that tell
+_MANY = 500  # rows at which a width's contrast is hardly chance
+_LOOKED_AT = 120_000  # numbers
+# Contrast by which another width must win, and that of the parts of a file that are channels; by hand.
+_CLEARLY = 1.25
+_CHANNELS = 0.2
+_ALIKE = 1.05
+_WIDER = 20.0  # times as far across: no two halves of a scan, by hand
+
+
+def wider(numbers: Numbers, width: int, contrast: Contrast) -> int:
+    """A width that explains the numbers clearly better than `width` of three to six; that, where none does."""
+    some = numbers[:_LOOKED_AT]
+    least = max(_CLEARLY * contrast(some, width), _CHANNELS)
+    for wide in range(7, _WIDEST + 1):
+        fits = wide % width and len(numbers) % wide == 0 and len(some) >= _MANY * wide
+        if fits and contrast(some, wide) >= least:
+            return wide
+    return width
+
+
+def rows_together(rows: Numbers) -> int:
+    """How many rows (N, width) make one point: 1 where all hold coordinates.
+
+    Where every second (third, fourth) row has other kinds of numbers as x, y or z, the rows are too narrow. That z
+    differs alone says nothing: some sensors fire their upper and lower lasers in turn.
+    """
+    for together in range(2, _WIDEST // rows.shape[1] + 1):
+        if len(rows) % together or len(rows) // together < _FEWEST:
+            continue
+        first, *others = (_points_alone(rows[phase::together, :3]) for phase in range(together))
+        if any(len(first) and len(other) and _differ(first, other) for other in others):
+            return together
+    return 1
+
+
+def are_channels(numbers: Numbers, width: int, contrast: Contrast) -> bool:
+    """Whether all x come first, then all y, instead of rows of `width` numbers."""
+    if len(numbers) < 3 * _FEWEST:
+        return False
+    finite = np.where(np.isfinite(numbers), numbers, 0.0)
+    # In rows the next number is another coordinate; in a channel it is that of the next point.
+    next_, next_row = (_median_step(finite, step) for step in (1, width))
+    if next_ > _ALIKE * next_row:
+        return False
+    least = max(contrast(numbers[:_LOOKED_AT], width), _CHANNELS)
+    return any(_contrast_of_parts(numbers, parts, contrast) > least for parts in (3, 4, 5, 6))
+
+
+def _contrast_of_parts(numbers: Numbers, parts: int, contrast: Contrast) -> float:
+    if len(numbers) % parts:
+        return 0.0
+    some = numbers.reshape(parts, -1)[:, :: max(1, len(numbers) // _LOOKED_AT)]
+    return contrast(np.ravel(some.T), parts)
+
+
+def _points_alone(rows: Numbers) -> Numbers:
+    finite = rows[np.isfinite(rows).all(axis=1)]
+    return finite[finite.any(axis=1)]  # without missing returns
+
+
+def _differ(some: Numbers, others: Numbers) -> bool:
+    if [*map(_kind, some.T)] != [*map(_kind, others.T)]:
+        return True
+    spreads = [np.ptp(rows[:, :2].astype(np.float64), axis=0) for rows in (some, others)]
+    return bool((np.maximum(*spreads) > _WIDER * np.minimum(*spreads)).all())
+
+
+def _kind(column: Numbers) -> str:
+    if column.min() == column.max():
+        return "constant"
+    return "whole" if np.all(column == np.round(column)) else "free"
+
+
+def _median_step(numbers: NDArray[np.floating], step: int) -> float:
+    some = numbers[:_LOOKED_AT]
+    with np.errstate(over="ignore", invalid="ignore"):
+        return float(np.median(np.abs(some[step:] - some[:-step])))

@@ -1,0 +1,58 @@
+# SPDX-License-Identifier: MIT
+"""Tables of which one column holds x, y and z of each point as a list: pandas, polars, pyarrow and Parquet."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hybridreg.io.arrays import TOGETHER
+from hybridreg.io.faults import fault, shorten
+
+Array = NDArray[np.float64]
+
+_MOST = 6  # numbers a point: x, y, z and what sensors add
+
+
+def listed_points(x: Any, names: list[Any], name: str) -> Array | None:
+    """The lists of a column that is called `xyz` or alike, (N, 3 to 6), or those of three numbers of the only column; a
+    missing one is NaN. None where there is no such column of lists.
+
+    Raises
+    ------
+    ValueError
+        Lists of unequal length, or of something else than numbers.
+    """
+    lowered = [str(each).lower() for each in names]
+    together = next((lowered.index(each) for each in TOGETHER if each in lowered), None)
+    if {"x", "y", "z"} & set(lowered) or (together is None and len(names) != 1):
+        return None
+    label = names[together or 0]
+    column = x.column(label) if hasattr(x, "column") and hasattr(x, "schema") else x[label]
+    if not hasattr(column, "to_numpy") or str(getattr(column, "dtype", "")).startswith("Struct"):
+        return None  # records, whose names an array would lose
+    values = column.to_numpy()
+    listed = values if values.ndim == 2 else _stacked(values, label, name)
+    # A lone column of another name may hold anything: a quaternion, an image.
+    most = _MOST if together is not None else 3
+    return listed if listed is not None and 3 <= listed.shape[1] <= most else None
+
+
+def _stacked(values: NDArray[Any], label: Any, name: str) -> Array | None:
+    rows = [each for each in values if isinstance(each, (list, tuple, np.ndarray))]
+    lengths = sorted({len(each) for each in rows})
+    if not rows:
+        return None
+    if len(lengths) > 1:
+        problem = f"the lists of its column {shorten(label)} hold from {lengths[0]} to {lengths[-1]} numbers"
+        raise fault(name, problem, "give three numbers a point")
+    missing = np.full(lengths[0], np.nan)
+    try:
+        return np.array(
+            [each if isinstance(each, (list, tuple, np.ndarray)) else missing for each in values], np.float64
+        )
+    except (TypeError, ValueError) as error:
+        problem = f"column {shorten(label)} holds something else than numbers ({shorten(error)})"
+        raise fault(name, problem, "convert it to float") from error

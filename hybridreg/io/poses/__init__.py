@@ -1,0 +1,2 @@
+# SPDX-License-Identifier: MIT
+"""Poses as people, other tools and this library write them down."""

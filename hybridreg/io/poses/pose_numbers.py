@@ -1,0 +1,74 @@
+# SPDX-License-Identifier: MIT
+"""A pose from its numbers: a matrix, or a position with a quaternion or with angles."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hybridreg.io.faults import fault, shorten
+
+Array = NDArray[np.float64]
+
+EXPECTED = "write a pose as four lines of four numbers, or as one line: x y z qx qy qz qw"
+"""What to do with a file that holds no pose."""
+
+# How far a quaternion that was written with few digits may be from length 1; by hand.
+_ROUNDED = 0.03
+_MATRIX, _QUATERNION, _TIMED = (12, 16), 7, 8
+
+
+def pose_of_numbers(values: Any, name: str) -> Array:
+    """A pose (4, 4) of sixteen or twelve numbers row after row, of the seven x y z qx qy qz qw, or of a time and those.
+
+    Raises
+    ------
+    ValueError
+        Not numbers, another count of them, four rows of three, or a quaternion whose length is not 1.
+    """
+    try:
+        array = np.array(values, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise fault(name, f"holds no pose ({shorten(error)})", EXPECTED) from error
+    numbers = array.ravel()
+    if array.shape == (4, 3):
+        raise fault(name, "holds four rows of three numbers", f"transpose it: {EXPECTED}")
+    if array.ndim > 1 and len(array) > 1 and array[0].size in (12, 16, _QUATERNION, _TIMED):
+        raise fault(name, f"holds {len(array)} poses", "keep the one from the source to the target")
+    in_one_row = array.ndim == 1 or len(array) == 1
+    if numbers.size in (_QUATERNION, _TIMED) and in_one_row:
+        return _placed(numbers[-7:-4], _rotation(numbers[-4:], name))
+    if numbers.size not in _MATRIX:
+        raise fault(name, f"holds {numbers.size} numbers", EXPECTED)
+    T = np.eye(4)
+    T.flat[: numbers.size] = numbers
+    return T
+
+
+def pose_of_angles(position: Sequence[float], roll_pitch_yaw: Sequence[float]) -> Array:
+    """A pose (4, 4) of x y z and of radians about the fixed axes x, then y, then z, as URDF has them."""
+    from scipy.spatial.transform import Rotation
+
+    return _placed(np.array(position), Rotation.from_euler("xyz", roll_pitch_yaw).as_matrix())
+
+
+def _rotation(quaternion: Array, name: str) -> Array:
+    from scipy.spatial.transform import Rotation
+
+    length = float(np.linalg.norm(quaternion))
+    if not abs(length - 1.0) <= _ROUNDED:
+        problem = (
+            f"the last four of its {_QUATERNION} numbers have the length {length:.4g}, a quaternion has 1"
+        )
+        raise fault(name, problem, EXPECTED)
+    R: Array = Rotation.from_quat(quaternion).as_matrix()
+    return R
+
+
+def _placed(position: Array, R: Array) -> Array:
+    T = np.eye(4)
+    T[:3, :3], T[:3, 3] = R, position
+    return T
