@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from hybridreg.io.arrays import array_points
 from hybridreg.io.faults import fault, foreign_parser
 from hybridreg.io.formats.npy import array_of_npy, npy_header
+from hybridreg.io.meaning.first_column import FEWEST
 from hybridreg.io.meaning.image_shapes import is_image
 from hybridreg.io.meaning.length_units import in_metres, unit_given
 
@@ -60,8 +61,9 @@ def _cloud_key(archive: zipfile.ZipFile, name: str) -> str:
             return key
     shapes = {key: _shape(archive, key, name) for key in keys}
     tables = [key for key, shape in shapes.items() if len(shape) == 2 and shape[1] >= 3]
-    # A depth image beside the cloud is no second cloud; alone it is refused as what it is.
-    fitting = [key for key in tables if not is_image(*shapes[key])] or tables
+    # A depth image or a matrix beside the cloud is no second cloud; alone it is refused as what it is.
+    clouds = [key for key in tables if not is_image(*shapes[key]) and max(shapes[key]) >= FEWEST]
+    fitting = clouds or tables
     if len(fitting) != 1:
         held = ", ".join(f"{key} {shape}" for key, shape in shapes.items()) or "no array"
         problem = f"has no array {' or '.join(_KEYS)}, and {len(fitting)} of shape (N, 3) under other names"
