@@ -79,7 +79,7 @@ def _rows(array: NDArray[Any], name: str, batched: bool) -> NDArray[Any]:
         refuse_image(shape[0], shape[1], name)
         return array
     flat = np.squeeze(array)
-    if flat.ndim == 2:
+    if flat.ndim == 2 and min(flat.shape) > _MOST_CHANNELS:
         refuse_image(flat.shape[0], flat.shape[1], name)
     raise fault(name, f"expected an array of shape (N, 3), got {shape}", _shape_cure(array, batched))
 

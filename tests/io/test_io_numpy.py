@@ -147,7 +147,9 @@ def test_two_candidates_are_refused_with_their_shapes(cloud):
 
 def test_an_image_beside_the_cloud_is_no_second_candidate(cloud):
     depth = np.ones((48, 64))
-    np.testing.assert_array_equal(parse_npz(npz(depth=depth, scan=cloud), "a.npz"), cloud)
+    np.testing.assert_array_equal(parse_npz(npz(depth=depth, scan=cloud, T=np.eye(4)), "a.npz"), cloud)
+    with pytest.raises(ValueError, match=r"2 of shape.*depth \(48, 64\), K \(3, 3\)"):
+        parse_npz(npz(depth=depth, K=np.eye(3)), "a.npz")
     with pytest.raises(ValueError, match=r"'depth'.*48 x 64 numbers are an image"):
         parse_npz(npz(depth=depth), "a.npz")
 

@@ -102,6 +102,7 @@ def test_several_clouds_are_not_one() -> None:
     torch = pytest.importorskip("torch")
     assert "x[0]" in refused(np.stack([P, P]))
     assert "x[0]" in refused(torch.tensor(np.stack([P] * 16)))
+    assert "x[0]" in refused(torch.tensor(P.T)[None])
     same(torch.tensor(P)[None])
 
 

@@ -42,7 +42,8 @@ def rows_together(rows: Numbers) -> int:
     for together in range(2, _WIDEST // rows.shape[1] + 1):
         if len(rows) % together or len(rows) // together < _FEWEST:
             continue
-        first, *others = (_points_alone(rows[phase::together, :3]) for phase in range(together))
+        some = rows[:_LOOKED_AT, :3]
+        first, *others = (_points_alone(some[phase::together]) for phase in range(together))
         if any(len(first) and len(other) and _differ(first, other) for other in others):
             return together
     return 1
@@ -52,12 +53,13 @@ def are_channels(numbers: Numbers, width: int, contrast: Contrast) -> bool:
     """Whether all x come first, then all y, instead of rows of `width` numbers."""
     if len(numbers) < 3 * _FEWEST:
         return False
-    finite = np.where(np.isfinite(numbers), numbers, 0.0)
+    some = numbers[:_LOOKED_AT]
+    finite = np.where(np.isfinite(some), some, 0.0)
     # In rows the next number is another coordinate; in a channel it is that of the next point.
     next_, next_row = (_median_step(finite, step) for step in (1, width))
     if next_ > _ALIKE * next_row:
         return False
-    least = max(contrast(numbers[:_LOOKED_AT], width), _CHANNELS)
+    least = max(contrast(some, width), _CHANNELS)
     return any(_contrast_of_parts(numbers, parts, contrast) > least for parts in (3, 4, 5, 6))
 
 
@@ -87,6 +89,5 @@ def _kind(column: Numbers) -> str:
 
 
 def _median_step(numbers: NDArray[np.floating], step: int) -> float:
-    some = numbers[:_LOOKED_AT]
     with np.errstate(over="ignore", invalid="ignore"):
-        return float(np.median(np.abs(some[step:] - some[:-step])))
+        return float(np.median(np.abs(numbers[step:] - numbers[:-step])))
