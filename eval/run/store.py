@@ -172,8 +172,9 @@ class Appender:
 def _by_content(config: Mapping[str, Any]) -> dict[str, Any]:
     # Data are the same wherever they lie, and however their path is written.
     data = config.get("data")
-    known = isinstance(data, Mapping) and data.get("fingerprint")
-    return {**config, "data": {k: v for k, v in data.items() if k != "name"}} if known else dict(config)
+    if not isinstance(data, Mapping) or not data.get("fingerprint"):
+        return dict(config)
+    return {**config, "data": {key: value for key, value in data.items() if key != "name"}}
 
 
 def differences(old: Any, new: Any, name: str = "") -> Iterator[str]:

@@ -287,11 +287,13 @@ def test_a_table_without_a_row_yet(tmp_path: Path) -> None:
 
 
 @pytest.mark.filterwarnings("error")
-def test_poses_beyond_any_world_are_no_success(tmp_path: Path) -> None:
-    huge = np.full((4, 4), 1e300).tolist()
-    whole = table_run.of_files([_with_pose(tmp_path, huge)])
-    score = whole.scores(hr.eval.protocol("cross3dreg"))["p"]
-    assert score.recall < 1.0
+def test_poses_beyond_any_world_are_no_rows(tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match=r"line 2: not a row of predictions: T: the last row"):
+        table_run.of_files([_with_pose(tmp_path, np.full((4, 4), 1e300).tolist())])
+    far = np.eye(4)
+    far[:3, 3] = 1e300
+    whole = table_run.of_files([_with_pose(tmp_path, far.tolist())])
+    assert whole.scores(hr.eval.protocol("cross3dreg"))["p"].recall < 1.0
 
 
 def _with_pose(folder: Path, T: Any) -> Path:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybridreg.io import tables
-from hybridreg.io.arrays import FEWEST, array_points
+from hybridreg.io.arrays import array_points
 from hybridreg.io.column_names import find_axes
 from hybridreg.io.faults import fault, foreign_parser
 from hybridreg.io.formats.npy import array_of_npy, npy_header
@@ -77,15 +77,15 @@ def _cloud_keys(archive: zipfile.ZipFile, name: str) -> list[str]:
         if key in keys:
             return [key]
     shapes = {key: _shape(archive, key, name) for key in keys}
-    tables = [key for key, shape in shapes.items() if len(shape) == 2 and shape[1] >= 3]
+    flat = [key for key, shape in shapes.items() if len(shape) == 2 and shape[1] >= 3]
     # A depth image or a matrix beside the cloud is no second cloud; alone it is refused as what it is.
-    clouds = [key for key in tables if not is_image(*shapes[key]) and max(shapes[key]) >= FEWEST]
+    clouds = [key for key in flat if not is_image(*shapes[key]) and max(shapes[key]) >= FEWEST]
     axes = None if clouds else find_axes(keys, name)
     if axes is not None:
         return [keys[column] for column in axes.columns]
     if len(keys) == 1 and len(shapes[keys[0]]) == 1:
         return keys  # records, or numbers in one row, of which `array_points` tells
-    fitting = clouds or tables
+    fitting = clouds or flat
     if len(fitting) != 1:
         held = ", ".join(f"{key} {shape}" for key, shape in shapes.items()) or "no array"
         problem = f"has no array {' or '.join(_KEYS)}, and {len(fitting)} of shape (N, 3) under other names"
