@@ -144,7 +144,8 @@ def test_a_rival_that_stopped_on_its_way_to_the_pose_is_none() -> None:
     result = hr.register(made.pair.source, made.pair.target)
     assert metrics.rre_deg(result.transformation, made.T_target_source) < 0.5
     assert result.verdict == "ok"
-    assert len(result.rivals) == 0
+    # Half a turn off the field looks much alike, which is told.
+    assert all(metrics.rre_deg(T, made.T_target_source) > 90.0 for T in result.rivals)
 
 
 def test_two_rivals_that_meet_are_one() -> None:
