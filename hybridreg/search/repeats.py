@@ -21,9 +21,9 @@ _CELL = 1.0
 # rarer, where a corridor repeats, as far as most of a cloud reaches (`hybridreg.resolution`); by hand.
 _ACROSS, _ALONG = 20, 60
 # Rotations tried with each shift, degrees; by hand.
-_TURNS_DEG = (-4.5, -3.0, -1.5, 0.0, 1.5, 3.0, 4.5)
+_TURNS_DEG = (-3.0, -1.5, 0.0, 1.5, 3.0)
 # Degrees between turns without a shift, and the first of them; by hand.
-_ROUND_DEG, _FIRST_DEG = 1.5, 6.0
+_ROUND_DEG, _FIRST_DEG = 2.0, 6.0
 # Points of each kind that are moved: for speed.
 _POINTS = 400
 # Share of the points that coincide at the pose which must coincide elsewhere, of either kind, and of all; by hand.
@@ -90,7 +90,7 @@ class _Place:
     def turned(self) -> Iterator[Array]:
         degrees = np.concatenate([[0.0], np.arange(_FIRST_DEG, 360.0 - _FIRST_DEG, _ROUND_DEG)])
         turns = se3.rotation_about(np.radians(degrees)[:, None] * self.up)
-        things = self.things[self.axis > 0][: _POINTS // 2]
+        things = self.things[self.axis > 0][: _POINTS // 3]
         others = OccupiedCells(self.others[self.other_axis > 0], self.cell)
         for centre in self.centres:
             moved = (things - centre) @ np.swapaxes(turns, 1, 2) + centre
