@@ -95,6 +95,8 @@ class _Place:
         for centre in self.centres:
             moved = (things - centre) @ np.swapaxes(turns, 1, 2) + centre
             met = _CHANCE + others.hold(moved).sum(axis=1)
+            if met[0] < _CHANCE + 0.5 * _FEWEST:  # nothing coincides at the pose itself
+                continue
             share = np.where(met >= _OF_ALL * met[0], met / met[0], 0.0)
             share[0] = 0.0
             for _, k in _peaks(share[None], centre=False):
@@ -120,7 +122,8 @@ class _Place:
             cells, own = OccupiedCells(held, self.cell), arms[self.axis == kind]
             met = _CHANCE + np.stack([cells.met(own @ turn.T @ frame.T, reach) for turn in turns])
             np.minimum(share, met / met[:, reach[0], reach[1]].max(), out=share)
-        return share
+        # Infinite where the other cloud has nothing near.
+        return np.where(np.isfinite(share), share, 0.0)
 
 
 def _apart(places: Sequence[Array], least: float) -> list[Array]:

@@ -93,3 +93,10 @@ def test_a_map_that_holds_a_place_turned_or_raised_shows_both(turn_deg: float, u
         (se3.angle_deg(T[:3, :3] @ other[:3, :3].T), np.linalg.norm(T[:3, 3] - other[:3, 3])) for T in found
     ]
     assert any(degrees < 2.0 and metres < 0.5 for degrees, metres in off)
+
+
+def test_a_pose_that_lays_the_clouds_apart_has_no_copies() -> None:
+    both = views.of(Scene.on_cells(Pair.of(tower(0.0, 0.0, seed=2), tower(0.0, 0.0, seed=0)), 0.25))
+    far = np.eye(4)
+    far[0, 3] = 5000.0
+    assert copies(both, far, compare(both, far).axes) == []
