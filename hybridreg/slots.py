@@ -11,6 +11,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from hybridreg.geometry import se3
 from hybridreg.matches import Correspondences, Overlap, Pose
 from hybridreg.pair import Pair
 from hybridreg.scene import Scene
@@ -73,9 +74,8 @@ def checked(slot: str, stage: Any, value: Any, scene: Scene | None = None) -> An
     ------
     ValueError
         It is of another type than the slot's, an overlap of another shape or out of [0, 1], or matches that are not
-        finite or weigh less than nothing; the message names slot
-        and stage and says what to return. A pose of another shape, or that is not finite, counts as none, which the
-        reasons say; one that is no rigid motion is noted.
+        finite or weigh less than nothing; the message names slot and stage and says what to return. A pose of another
+        shape, or that is not finite, counts as none, which the reasons say; one that is no rigid motion is noted.
     """
     name = getattr(stage, "__name__", type(stage).__name__)
     kind, cure = _KINDS[slot]
@@ -122,7 +122,7 @@ def _check_pose(whose: str, pose: Pose, cure: str, scene: Scene) -> None:
         wrong = f"of shape {T.shape}" if T.shape != (4, 4) else "that is not finite"
         scene.note(f"{whose} returned a pose {wrong}, which counts as none; {cure}")
         scene.explanations.append(f"{whose} returned a pose {wrong}")
-    elif pose.found and np.abs(T[:3, :3] @ T[:3, :3].T - np.eye(3)).max() > _NO_ROTATION:
+    elif pose.found and se3.off_rotation(T[:3, :3]) > _NO_ROTATION:
         scene.note(
             f"{whose} returned a pose whose upper left 3x3 block is no rotation; the nearest one was taken"
         )

@@ -472,9 +472,10 @@ def test_a_pose_that_is_not_finite_is_told_by_its_stage() -> None:
     assert result.reasons[0].endswith("returned a pose that is not finite")
 
 
-def test_a_pose_that_is_no_rigid_motion_is_noted() -> None:
-    scaled = _refining(lambda pose: dataclasses.replace(pose, T=pose.T @ np.diag([2.0, 2.0, 2.0, 1.0])))
-    result = hr.Pipeline(match="none", estimate="identity", refine=scaled).run(testing.sample_pair()[0])
+@pytest.mark.parametrize("factors", [[2.0, 2.0, 2.0, 1.0], [1.0, 1.0, -1.0, 1.0]])
+def test_a_pose_that_is_no_rigid_motion_is_noted(factors: list[float]) -> None:
+    bent = _refining(lambda pose: dataclasses.replace(pose, T=pose.T @ np.diag(factors)))
+    result = hr.Pipeline(match="none", estimate="identity", refine=bent).run(testing.sample_pair()[0])
     assert any("no rotation; the nearest one was taken" in note for note in result.notes)
 
 

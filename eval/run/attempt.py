@@ -9,6 +9,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Protocol, runtime_checkable
 
+from hybridreg.eval.run.row import ROUNDED
 from hybridreg.frames import raise_pose
 from hybridreg.geometry import se3
 from hybridreg.matches import Correspondences
@@ -30,8 +31,6 @@ class Traceable(Protocol):
 # Or a function of pair and seed that returns a 4x4 pose, a RegistrationResult, anything else with the pose as
 # `transformation` (Open3D's results), or None for "not found".
 Method = Traceable | Callable[[Pair, int], Any]
-# By how much an answer's rotation may be off, from float32 or few digits; it is made exact.
-_ROUNDED = 1e-3
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -99,7 +98,7 @@ def _called(method: Callable[[Pair, int], Any], pair: Pair, seed: int) -> Attemp
 
 def _pose(answer: Any) -> Any:
     try:
-        return se3.rounded(answer, "the method's answer", _ROUNDED)
+        return se3.rounded(answer, "the method's answer", ROUNDED)
     except ValueError as error:
         raise ValueError(
             f"{error}; a method returns a rigid 4x4 pose, a RegistrationResult, or None where it found none"

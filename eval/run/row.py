@@ -18,8 +18,8 @@ from hybridreg.io.structured import parse_json
 Array = NDArray[np.float64]
 Matrix = list[list[float]]
 
-# By how much a stored rotation may be off.
-_ROUNDED = 1e-3
+# By how much the rotation of a pose, answered or stored, may be off: from float32 or few digits.
+ROUNDED = 1e-3
 _POSES = ("T", "T_estimated", "T_true")
 
 
@@ -96,7 +96,7 @@ class Row:
             raise ValueError("not a row of predictions: moments is not a finite 4x4 matrix")
         for name in _POSES:
             if getattr(row, name) is not None:
-                se3.check(getattr(row, name), f"not a row of predictions: {name}", _ROUNDED)
+                se3.check(getattr(row, name), f"not a row of predictions: {name}", ROUNDED)
         return row
 
     @property

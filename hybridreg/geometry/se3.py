@@ -134,7 +134,7 @@ def check(T: Any, name: str = "T", tolerance: float = 1e-4) -> Array:
             f"{name}: the last row is {matrix[3]}, expected [0 0 0 1]; is the matrix transposed?"
         )
     with np.errstate(over="ignore", invalid="ignore"):
-        off = float(np.abs(matrix[:3, :3] @ matrix[:3, :3].T - np.eye(3)).max())
+        off = _off_orthogonal(matrix[:3, :3])
         determinant = float(np.linalg.det(matrix[:3, :3]))
     if not off <= tolerance or determinant < 0:
         raise ValueError(
@@ -149,8 +149,16 @@ def rounded(T: Any, name: str, tolerance: float) -> Array:
     exact unless it is so already."""
     matrix = check(T, name, tolerance)
     R = matrix[:3, :3]
-    exact = np.abs(R @ R.T - np.eye(3)).max() <= _EXACT
-    return matrix if exact else from_rt(project(R), matrix[:3, 3])
+    return matrix if _off_orthogonal(R) <= _EXACT else from_rt(project(R), matrix[:3, 3])
+
+
+def off_rotation(R: Array) -> float:
+    """By how much R (3, 3), finite, is no rotation: the largest part of R R^T - 1; infinite for a reflection."""
+    return _off_orthogonal(R) if np.linalg.det(R) > 0.0 else np.inf
+
+
+def _off_orthogonal(R: Array) -> float:
+    return float(np.abs(R @ R.T - np.eye(3)).max())
 
 
 def turn_to_z(up: Array) -> Array:
