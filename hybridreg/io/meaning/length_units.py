@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from hybridreg.io.coordinate_systems.well_known_text import unit_of_text
 from hybridreg.io.faults import fault, shorten
 
 Array = NDArray[np.float64]
@@ -51,7 +52,7 @@ _OF_OTHERS = (
     "error",
     "resolution",
 )
-_SYSTEM = re.compile(r'UNIT\s*\[\s*"([^"]*)"')  # of a coordinate reference system
+_SYSTEM = re.compile(r'UNIT\s*\[\s*"')  # of a coordinate reference system
 _SCALE = re.compile(r"\bscale(?:[ _]?factor)?\s*[:=]\s*([0-9.]+(?:e[+-]?\d+)?)\s*", re.IGNORECASE)
 # Where objects say it: astropy, pint and trimesh; in dictionaries, as those of xarray, pandas, h5py and pyarrow.
 _ATTRIBUTES = ("unit", "units")
@@ -168,11 +169,10 @@ def in_metres(points: Array, metres: float | None, name: str) -> Array:
 
 
 def _of_system(text: str, name: str) -> float | None:
-    units = _SYSTEM.findall(text)
-    if "GEOGCS" in text and "PROJCS" not in text:  # longitude and latitude, whatever the unit of heights is
+    unit = unit_of_text(text)
+    if unit.degrees:  # longitude and latitude, whatever the unit of heights is
         return metres_of("degree", name)
-    # The unit of a system stands after its parts.
-    return next((METRES[unit.lower()] for unit in reversed(units) if unit.lower() in METRES), None)
+    return None if unit.unknown else unit.across
 
 
 def _number(text: str) -> float:
