@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from hybridreg.geometry.distinct_keys import distinct_keys
 from hybridreg.geometry.extent import radii
 from hybridreg.geometry.extent import reach as reach_of
 from hybridreg.runtime.cores import query_threads
@@ -177,12 +178,12 @@ def angular_resolution(directions: Array, finest: float = _FINEST) -> float:
     While cells are finer than the gaps between rings, doubling them doubles the part of the sky that counts as
     seen; once they are wider it hardly grows. The doubling stops there.
     """
-    return _resolution(np.unique(_cells(directions, finest)), finest)
+    return _resolution(distinct_keys(_cells(directions, finest)), finest)
 
 
 def _resolution(cells: Integers, angle: float) -> float:
     while angle < _COARSEST:
-        coarser = np.unique(_merged(cells))
+        coarser = distinct_keys(_merged(cells))
         if 4 * len(coarser) < _FILLED * len(cells):
             break
         angle, cells = 2 * angle, coarser

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from hybridreg.geometry import ground
+from hybridreg.geometry.distinct_keys import distinct_keys
 from hybridreg.geometry.extent import radii, reach
 
 Array = NDArray[np.float64]
@@ -158,7 +159,7 @@ def differing(directions: Array, distances: Array) -> float:
     if len(directions) > _RAYS:
         # Whole patches of the sphere, as thinned rays would be farther apart.
         cells = ((directions + 1.0) / _CELL).astype(np.int64) @ np.array([1, 1_000, 1_000_000])
-        order = rng.permutation(np.unique(cells))
+        order = rng.permutation(distinct_keys(cells))
         kept = np.isin(cells, order[: max(1, len(order) * _RAYS // len(cells))])
         directions, distances = directions[kept], distances[kept]
     if len(directions) < 2:

@@ -6,6 +6,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from hybridreg.geometry.distinct_keys import distinct_keys
+
 Array = NDArray[np.float64]
 
 
@@ -23,7 +25,7 @@ class OccupiedCells:
         cells = np.floor(points / cell).astype(np.int64)
         self._cell, self._origin = cell, cells.min(axis=0)
         self._size = cells.max(axis=0) - self._origin + 1
-        self._keys = np.unique(self._key((cells - self._origin).T))
+        self._keys = distinct_keys(self._key((cells - self._origin).T))
 
     def _key(self, cells: NDArray[np.int64]) -> NDArray[np.int64]:
         i, j, k = cells

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from hybridreg.evidence.views import Views
 from hybridreg.geometry import se3
-from hybridreg.geometry.main_axes import faced
+from hybridreg.search.moved_points import CHANCE, MovedPoints
 from hybridreg.search.occupied_cells import OccupiedCells
 
 Array = NDArray[np.float64]
@@ -32,10 +32,8 @@ _SHARE, _OF_ALL = 0.25, 0.4
 _MOST = 4
 # Cells, or turns, between two of them, at least; by hand.
 _APART = 2
-# Fewest points that identify a place; by hand.
-_FEWEST = 20
-# Points of either axis that coincide by chance, added to every count; by hand.
-_CHANCE = 10.0
+# Fewest points that coincide at the pose itself, for a turn to be looked for; by hand.
+_AT_POSE = 10.0
 
 
 def copies(views: Views, T_target_source: Array, axes: Array) -> list[Array]:
@@ -47,35 +45,25 @@ def copies(views: Views, T_target_source: Array, axes: Array) -> list[Array]:
     corridor the floor does anyway. Two points coincide in one cell of a grid.
     """
     place = _Place(views, T_target_source, axes)
-    if place.tells_nothing:
+    if place.tell_nothing:
         return []
     return [M @ T_target_source for M in (*place.shifted(), *place.raised(), *place.turned())]
 
 
-class _Place:
-    # The source's points under a pose, those that face the commonest axis and others, and the target's.
-
+class _Place(MovedPoints):
     def __init__(self, views: Views, T: Array, axes: Array) -> None:
-        source, target = views.source, views.target
-        facing = faced(source.normals[source.settling] @ T[:3, :3].T, axes)
-        kept = np.concatenate([np.flatnonzero(facing > 0)[:_POINTS], np.flatnonzero(facing == 0)[:_POINTS]])
-        self.axis, self.axes, self.cell = facing[kept], axes, _CELL * views.spacing
-        self.things = se3.apply(T, source.points[source.settling[kept]])
-        self.others, self.other_axis = target.points, faced(target.normals, axes)
-        self.tells_nothing = (
-            min(np.count_nonzero(rows > 0) for rows in (self.axis, self.other_axis)) < _FEWEST
-        )
+        super().__init__(views, T, axes, _CELL * views.spacing, _POINTS)
         origin = np.zeros(3)
-        own = se3.apply(T, np.array([source.centre, origin]))
-        self.centres = _apart([*own, target.centre, origin], 2.0 * self.cell)
+        own = se3.apply(T, np.array([views.source.centre, origin]))
+        self.centres = _apart([*own, views.target.centre, origin], 2.0 * self.cell)
         self.up = axes[0] if views.up is None else views.up
 
     def shifted(self) -> Iterator[Array]:
         middle = self.things[self.axis > 0].mean(axis=0)
-        frame = np.vstack([self.axes[1:], self.axes[:1]])
+        frame = self.upright
         reach = (_ACROSS, _ALONG)
         turns = [se3.rotation_about(np.radians(deg) * self.axes[0]) for deg in _TURNS_DEG]
-        share = self._share((1, 2), frame, middle, turns, reach)
+        share = self.share((1, 2), frame, middle, turns, reach)
         best, turn = share.max(axis=0), share.argmax(axis=0)
         for i, j in _peaks(best):
             shift = self.cell * np.array([i - reach[0], j - reach[1], 0]) @ frame
@@ -83,7 +71,7 @@ class _Place:
 
     def raised(self) -> Iterator[Array]:
         middle = self.things.mean(axis=0)
-        share = self._share((0, 1, 2), self.axes[[1, 0, 2]], middle, [np.eye(3)], (0, _ALONG))[0]
+        share = self.share((0, 1, 2), self.axes[[1, 0, 2]], middle, [np.eye(3)], (0, _ALONG))[0]
         for _, j in _peaks(share):
             yield se3.from_rt(np.eye(3), self.cell * (j - _ALONG) * self.axes[0])
 
@@ -94,36 +82,13 @@ class _Place:
         others = OccupiedCells(self.others[self.other_axis > 0], self.cell)
         for centre in self.centres:
             moved = (things - centre) @ np.swapaxes(turns, 1, 2) + centre
-            met = _CHANCE + others.hold(moved).sum(axis=1)
-            if met[0] < _CHANCE + 0.5 * _FEWEST:  # nothing coincides at the pose itself
+            met = CHANCE + others.hold(moved).sum(axis=1)
+            if met[0] < CHANCE + _AT_POSE:  # nothing coincides at the pose itself
                 continue
             share = np.where(met >= _OF_ALL * met[0], met / met[0], 0.0)
             share[0] = 0.0
             for _, k in _peaks(share[None], centre=False):
                 yield se3.about(centre, turns[k], np.zeros(3))
-
-    def _share(
-        self,
-        kinds: Sequence[int],
-        frame: Array,
-        middle: Array,
-        turns: Sequence[Array],
-        reach: tuple[int, int],
-    ) -> Array:
-        # Of the points that coincide at the pose the least share of any kind, (turns, 2 rows + 1, 2 columns + 1).
-        arms = self.things - middle
-        farthest = np.linalg.norm(arms, axis=1).max() + 2 * max(reach) * self.cell
-        share = np.full((len(turns), 2 * reach[0] + 1, 2 * reach[1] + 1), np.inf)
-        for kind in kinds:
-            held = (self.others[self.other_axis == kind] - middle) @ frame.T
-            held = held[np.abs(held).max(axis=1) < farthest]
-            if len(held) == 0:
-                continue
-            cells, own = OccupiedCells(held, self.cell), arms[self.axis == kind]
-            met = _CHANCE + np.stack([cells.met(own @ turn.T @ frame.T, reach) for turn in turns])
-            np.minimum(share, met / met[:, reach[0], reach[1]].max(), out=share)
-        # Infinite where the other cloud has nothing near.
-        return np.where(np.isfinite(share), share, 0.0)
 
 
 def _apart(places: Sequence[Array], least: float) -> list[Array]:

@@ -9,10 +9,12 @@ from numpy.typing import NDArray
 from hybridreg.evidence.pose_evidence import PoseEvidence
 from hybridreg.evidence.surface_distance import settle_closely
 from hybridreg.matches import Pose
+from hybridreg.resolution import tolerance
 from hybridreg.scene import Scene
 from hybridreg.search import settle
 from hybridreg.search.axis_turns import TURNS, poses
 from hybridreg.search.hypothesis import Hypothesis, as_hypotheses, parted, seen_at
+from hybridreg.search.near_copies import near_copies
 from hybridreg.search.ranking import best, differs, distinct, with_matches
 from hybridreg.search.repeats import copies
 
@@ -49,7 +51,11 @@ def find(scene: Scene, own: Hypothesis, pose: Pose) -> list[Hypothesis]:
     guessed = [one.T for one in likeliest if not one.settled]
     guessed += [T for T in turned[:_FULLEST] if is_rival(T)]
     moved = seen_at(scene, settle.settle(views, np.array(guessed).reshape(-1, 4, 4)), _CLOSE)
-    rivals = [*(one for one in likeliest if one.settled), *moved]
+    allowed = tolerance(scene.pair.source, scene.pair.target)
+    likely = own.log_odds > -_CONTENDS
+    copied = near_copies(views, own.T, own.at.agreement.axes, allowed) if likely else []
+    beside = seen_at(scene, copied, _CLOSE)
+    rivals = [*(one for one in likeliest if one.settled), *moved, *beside]
     # Guesses that come back to the pose are no rivals, and two that meet are one; neither must hide those behind them.
     apart = distinct(scene, (with_matches(scene, one) for one in rivals if is_rival(one.T)))[:_ENOUGH]
 
@@ -57,7 +63,8 @@ def find(scene: Scene, own: Hypothesis, pose: Pose) -> list[Hypothesis]:
         # Where surfaces hold a pose loosely, a rival may have stopped on its way to it.
         return one.log_odds < own.log_odds - _CONTENDS or is_rival(settle_closely(views.fine, one.T))
 
-    return [one for one in apart if came_to_rest(one)]
+    near = best(with_matches(scene, one) for one in beside if not is_rival(one.T))[:1]
+    return [*(one for one in apart if came_to_rest(one)), *near]
 
 
 def _turned(own: PoseEvidence) -> Array:

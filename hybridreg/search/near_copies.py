@@ -1,0 +1,79 @@
+# SPDX-License-Identifier: MIT
+"""Copies of a place just beside a pose: a map that was built badly holds every wall twice, a metre apart.
+
+`hybridreg.search.repeats` begins where poses are two answers to every search (`hybridreg.search.ranking.differs`). What
+lies between that and the tolerance takes finer cells, and turns of a few degrees without a shift.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hybridreg.evidence.surface_distance import settle_closely
+from hybridreg.evidence.views import Views
+from hybridreg.geometry import se3
+from hybridreg.resolution import Tolerance
+from hybridreg.search.moved_points import MovedPoints
+
+Array = NDArray[np.float64]
+
+# Edge of a cell, of the spacing or of the tolerance, whichever is less, and the farthest shift, spacings; by hand.
+_CELL, _REACH = 0.5, 3.5
+# Turns tried with each shift, degrees; by hand.
+_TURNS_DEG = tuple(np.arange(-5.0, 6.0))
+# Points of each kind that are moved: for speed.
+_POINTS = 120
+# Share of the points that coincide at the pose which must coincide beside it; by hand. Beside true poses without a copy
+# no other peak has as many; beside copies that overlap there are many, of which the fullest count.
+_SHARE = 0.5
+# Guesses that are settled, at most; by hand.
+_MOST = 4
+
+
+def near_copies(views: Views, T_target_source: Array, axes: Array, allowed: Tolerance) -> list[Array]:
+    """Poses (4, 4) beyond the tolerance but within some spacings of a pose, at which nearly as many points coincide,
+    each where the surfaces draw it."""
+    cell = _CELL * min(views.spacing, allowed.metres)
+    points = MovedPoints(views, T_target_source, axes, cell, _POINTS, wide=True)
+    if points.tell_nothing:
+        return []
+    reach = int(np.ceil(_REACH * views.spacing / cell))
+    middle = se3.apply(T_target_source, views.middle)
+
+    def apart(M: Array) -> bool:
+        moved = float(np.linalg.norm(se3.apply(M, middle) - middle))
+        return not Tolerance(se3.angle_deg(M[:3, :3]), moved).within(allowed)
+
+    guesses = [M for M in (*_shifted(points, reach), *_raised(points, reach)) if apart(M)][:_MOST]
+    if not guesses:
+        return []
+    settled = settle_closely(views.fine, np.array([M @ T_target_source for M in guesses]))
+    return [T for T in settled if apart(T @ se3.inverse(T_target_source))]
+
+
+def _shifted(points: MovedPoints, reach: int) -> list[Array]:
+    # Shifted along the commonest surface and turned on it, the fullest first.
+    turns = [se3.rotation_about(np.radians(deg) * points.axes[0]) for deg in _TURNS_DEG]
+    middle, frame = points.things[points.axis > 0].mean(axis=0), points.upright
+    share = points.share((1, 2), frame, middle, turns, (reach, reach))
+    return [
+        se3.about(middle, turns[turn], points.cell * np.array([i - reach, j - reach, 0]) @ frame)
+        for turn, i, j in _peaks(share)
+    ]
+
+
+def _raised(points: MovedPoints, reach: int) -> list[Array]:
+    # Away from the commonest surface: what faces the others meets there anyway.
+    frame, middle = points.axes[[1, 0, 2]], points.things.mean(axis=0)
+    share = points.share((0, 1, 2), frame, middle, [np.eye(3)], (0, reach))
+    return [se3.from_rt(np.eye(3), points.cell * (j - reach) * points.axes[0]) for _, _, j in _peaks(share)]
+
+
+def _peaks(share: Array) -> list[tuple[int, int, int]]:
+    # Where no less coincides than around, the fullest first.
+    from scipy.ndimage import maximum_filter
+
+    peak = np.argwhere((share == maximum_filter(share, (3, 5, 5), mode="constant")) & (share >= _SHARE))
+    order = np.argsort(-share[tuple(peak.T)], kind="stable")
+    return [(int(a), int(i), int(j)) for a, i, j in peak[order]]
