@@ -12,7 +12,9 @@ from hybridreg.evidence import views
 from hybridreg.evidence.agreement import compare
 from hybridreg.geometry import se3
 from hybridreg.pair import Pair
+from hybridreg.resolution import VEHICLES
 from hybridreg.scene import Scene
+from hybridreg.search.near_copies import near_copies
 from hybridreg.search.occupied_cells import OccupiedCells
 from hybridreg.search.repeats import copies
 
@@ -95,8 +97,31 @@ def test_a_map_that_holds_a_place_turned_or_raised_shows_both(turn_deg: float, u
     assert any(degrees < 2.0 and metres < 0.5 for degrees, metres in off)
 
 
+@pytest.mark.parametrize(
+    ("turn_deg", "shift"),
+    [(0.0, (0.7, 0.0, 0.0)), (0.0, (-0.4, 0.6, 0.0)), (3.0, (0.0, 0.0, 0.0)), (0.0, (0.0, 0.0, 0.7))],
+)
+def test_a_map_that_holds_every_wall_twice_shows_the_other_place(
+    turn_deg: float, shift: tuple[float, float, float]
+) -> None:
+    target, copy = tower(0.0, 0.0, seed=0), se3.yaw(turn_deg)
+    copy[:3, 3] = shift
+
+    def found(map_points: np.ndarray) -> list[np.ndarray]:
+        both = views.of(Scene.on_cells(Pair.of(tower(0.0, 0.0, seed=2), map_points), 0.25))
+        return near_copies(both, np.eye(4), compare(both, np.eye(4)).axes, VEHICLES)
+
+    def is_other(T: np.ndarray) -> bool:
+        step = T @ se3.inverse(copy)
+        return se3.angle_deg(step[:3, :3]) < 0.5 and bool(np.linalg.norm(step[:3, 3]) < 0.15)
+
+    assert any(is_other(T) for T in found(np.concatenate([target, se3.apply(copy, target)])))
+    assert not any(is_other(T) for T in found(target))
+
+
 def test_a_pose_that_lays_the_clouds_apart_has_no_copies() -> None:
     both = views.of(Scene.on_cells(Pair.of(tower(0.0, 0.0, seed=2), tower(0.0, 0.0, seed=0)), 0.25))
     far = np.eye(4)
     far[0, 3] = 5000.0
     assert copies(both, far, compare(both, far).axes) == []
+    assert near_copies(both, far, compare(both, far).axes, VEHICLES) == []

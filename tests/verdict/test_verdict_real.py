@@ -99,7 +99,16 @@ def test_a_source_of_another_size_is_not_ok_though_the_relief_of_the_ground_fits
 
 
 @pytest.mark.parametrize(
-    ("turn_deg", "shift"), [(0.0, (20.0, 0.0, 0.0)), (0.0, (0.0, 0.0, 3.0)), (30.0, (0.0, 0.0, 0.0))]
+    ("turn_deg", "shift"),
+    [
+        (0.0, (20.0, 0.0, 0.0)),
+        (0.0, (0.0, 0.0, 3.0)),
+        (30.0, (0.0, 0.0, 0.0)),
+        # Nearer than two answers to the search: a map that was built badly.
+        (0.0, (1.0, 1.0, 0.0)),
+        (3.0, (0.0, 0.0, 0.0)),
+        (0.0, (0.0, 0.0, 0.8)),
+    ],
 )
 def test_a_map_that_holds_the_place_twice_shows_both(
     real_data: Path, turn_deg: float, shift: tuple[float, float, float]
@@ -116,4 +125,4 @@ def test_a_map_that_holds_the_place_twice_shows_both(
     truth = truth_of(real_data, name)
     for right in (truth, copy @ truth):
         off = [right @ se3.inverse(T) for T in (result.transformation, *result.rivals)]
-        assert any(se3.angle_deg(M[:3, :3]) < 2.0 and np.linalg.norm(M[:3, 3]) < 1.0 for M in off)
+        assert any(se3.angle_deg(M[:3, :3]) < 1.0 and np.linalg.norm(M[:3, 3]) < 0.5 for M in off)
