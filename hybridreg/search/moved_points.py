@@ -57,7 +57,7 @@ class MovedPoints:
     @property
     def tell_nothing(self) -> bool:
         """Whether too few points of either cloud face another than the commonest axis."""
-        return min(np.count_nonzero(rows > 0) for rows in (self.axis, self.other_axis)) < _FEWEST
+        return any(int((rows > 0).sum()) < _FEWEST for rows in (self.axis, self.other_axis))
 
     @property
     def upright(self) -> Array:
