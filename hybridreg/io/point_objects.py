@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from hybridreg.io import tables
 from hybridreg.io.arrays import TOGETHER, array_points
 from hybridreg.io.coordinate_systems.las_extended import records_of_header
-from hybridreg.io.coordinate_systems.las_units import in_metres
+from hybridreg.io.coordinate_systems.las_units import metres_of_las
 from hybridreg.io.formats.las_withheld import without_withheld
 from hybridreg.io.list_columns import listed_points
 from hybridreg.io.meaning import length_units
@@ -62,7 +62,7 @@ def points_of(x: Any, name: str, depth: int = 0) -> Array:
     _refuse_mesh(x, name)
     if hasattr(getattr(x, "header", None), "vlrs") and hasattr(x, "xyz"):  # laspy
         points = without_withheld(_from_array(np.asarray(x.xyz), name), getattr(x, "withheld", None), name)
-        return in_metres(points, records_of_header(x.header, name), name)
+        return metres_of_las(points, records_of_header(x.header, name), name)
     held = _held(x)
     if held is not None and depth < _DEEPEST:
         return _held_points(held, x, name, depth)

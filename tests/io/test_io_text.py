@@ -141,6 +141,13 @@ def test_feet_and_inches_in_a_comment():
         np.testing.assert_allclose(points, np.array([[1, 2, 3], [4, 5, 6]]) * metres)
 
 
+def test_heights_have_the_unit_that_their_own_system_gives():
+    across, up = 'LOCAL_CS["L",UNIT["foot",0.3048]]', 'VERT_CS["h",VERT_DATUM["h",2005],UNIT["metre",1]]'
+    with pytest.warns(UserWarning, match=r"its unit is 0\.3048 m across and 1 m up"):
+        points = parse_text(f'# COMPD_CS["c",{across},{up}]\n1 2 3\n4 5 6\n'.encode(), "a.txt")
+    np.testing.assert_allclose(points, np.array([[1, 2, 3], [4, 5, 6]]) * [0.3048, 0.3048, 1.0])
+
+
 def test_a_scale_is_told():
     with pytest.warns(UserWarning, match=r"a\.txt: its header says 'scale: 0\.001', which was not applied"):
         np.testing.assert_array_equal(parse_text(b"# scale: 0.001\n1 2 3\n", "a.txt"), [[1, 2, 3]])
