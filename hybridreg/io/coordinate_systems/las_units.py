@@ -11,10 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybridreg.io.coordinate_systems.geo_keys import unit_of_keys
-from hybridreg.io.coordinate_systems.length_unit import LengthUnit
+from hybridreg.io.coordinate_systems.length_unit import LengthUnit, in_metres
 from hybridreg.io.coordinate_systems.well_known_text import unit_of_text
 from hybridreg.io.faults import fault
-from hybridreg.io.meaning.length_units import in_metres
 
 Array = NDArray[np.float64]
 

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hybridreg.io.coordinate_systems.length_unit import LengthUnit
+from hybridreg.io.coordinate_systems.length_unit import LengthUnit, in_metres
 from hybridreg.io.coordinate_systems.well_known_text import unit_of_text
 from hybridreg.io.faults import fault, shorten
 
@@ -156,24 +156,6 @@ def as_commented(points: Array, comments: Iterable[str], name: str) -> Array:
 def unit_in(comments: Iterable[str], name: str) -> LengthUnit | None:
     """The first unit that comments name, as `unit_said`."""
     return next((said for line in comments if (said := unit_said(line, name)) is not None), None)
-
-
-def in_metres(points: Array, metres: float | None, name: str, *, up: float | None = None) -> Array:
-    """Points (N, 3) whose unit has so many metres, that of z perhaps another, `up`; in metres. None leaves them.
-
-    Warns where that changes them, since their pose will be in metres too.
-    """
-    across = 1.0 if metres is None else metres
-    up = across if up is None else up
-    if across == up == 1.0:
-        return points
-    unit = f"{across:.6g} m" if across == up else f"{across:.6g} m across and {up:.6g} m up"
-    warnings.warn(
-        f"{name}: its own header says that its unit is {unit}; it was read in metres, and the pose is in metres too",
-        UserWarning,
-        stacklevel=3,
-    )
-    return points * (across, across, up)
 
 
 def _of_system(text: str, name: str) -> LengthUnit | None:
