@@ -29,6 +29,8 @@ _SMALLEST = 0.05  # metres: no sensor pair shares a smaller scene
 _MANY_CELLS = 100_000
 # Below this the grid has merged the points that were to be matched.
 _FEW_LEFT = 200
+# `dataclasses.replace` hands both on, though its caller gave one.
+_ONE_OF_THEM = "leave one of them out, or change a pipeline by its own method replace"
 _FUNCTIONS = (types.FunctionType, types.MethodType, types.BuiltinFunctionType, functools.partial)
 
 
@@ -40,13 +42,13 @@ def with_voxel(downsample: Any, voxel: float | None) -> Any:
         raise ValueError(f"voxel={voxel!r} must be a positive length in metres")
     if not _takes_voxel(downsample):
         raise ValueError(
-            f"voxel={voxel} was given, but {type(downsample).__name__} has no voxel; leave one of them out"
+            f"voxel={voxel} was given, but {type(downsample).__name__} has no voxel; {_ONE_OF_THEM}"
         )
     if downsample.voxel == voxel:
         return downsample
     if downsample.voxel is not None:
         raise ValueError(
-            f"voxel={voxel} contradicts the downsampling stage's own voxel={downsample.voxel}; leave one of them out"
+            f"voxel={voxel} contradicts the downsampling stage's own voxel={downsample.voxel}; {_ONE_OF_THEM}"
         )
     return dataclasses.replace(downsample, voxel=voxel)
 

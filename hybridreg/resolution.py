@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybridreg.cloud import PointCloud
+from hybridreg.geometry import se3
 from hybridreg.geometry.extent import reach, share_within
 
 Array = NDArray[np.float64]
@@ -75,6 +76,13 @@ class Tolerance(NamedTuple):
 
     degrees: float
     metres: float
+
+    @classmethod
+    def between(cls, T: Array, other: Array, centre: Array) -> Tolerance:
+        """How far one pose (4, 4) lies from another, at a point `centre` (3,) of the target's frame."""
+        step = other @ se3.inverse(T)
+        moved = float(np.linalg.norm(se3.apply(step, centre[None])[0] - centre))
+        return cls(se3.angle_deg(step[:3, :3]), moved)
 
     def within(self, allowed: Tolerance) -> bool:
         """Whether neither exceeds what is allowed."""

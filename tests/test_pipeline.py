@@ -253,6 +253,8 @@ def test_voxel_shorthand() -> None:
         hr.Pipeline(voxel=0.3, downsample=hr.VoxelGrid(voxel=0.4))
     with pytest.raises(ValueError, match="no voxel"):
         hr.Pipeline(voxel=0.3, downsample="random")
+    with pytest.raises(ValueError, match="own voxel=0.5; .*change a pipeline by its own method replace"):
+        dataclasses.replace(hr.Pipeline(voxel=0.5), voxel=0.3)
     with pytest.raises(ValueError, match="positive"):
         hr.Pipeline(voxel=-1.0)
 

@@ -15,6 +15,7 @@ from typing import Any
 from findings_page import page as findings_page  # mkdocs puts the folder of its hooks on the path
 from mkdocs.config.defaults import MkDocsConfig
 from mkdocs.structure.files import File, Files
+from mkdocs.structure.pages import Page
 
 ROOT = Path(__file__).resolve().parent.parent
 # `hybridreg.classical` and its like lie beside the package in a checkout; names are read where a wheel has them.
@@ -43,6 +44,11 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
         page = page_of(notebook, file.name + ".ipynb")
         files.append(File.generated(config, file.src_uri.removesuffix(".ipynb") + ".md", content=page))
     return files
+
+
+def on_page_markdown(markdown: str, page: Page, **_: Any) -> str:
+    """In a checkout the index names the notebooks themselves; on the site each has a page."""
+    return markdown.replace(".ipynb)", ".md)") if page.file.src_uri == "notebooks/index.md" else markdown
 
 
 def on_page_content(html: str, **_: Any) -> str:

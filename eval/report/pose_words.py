@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from hybridreg.geometry import se3
 from hybridreg.output.pose_text import roll_pitch_yaw
+from hybridreg.resolution import Tolerance
 from hybridreg.result import RegistrationResult
 
 Array = NDArray[np.float64]
@@ -81,9 +82,8 @@ def rivals(result: RegistrationResult, middle: Array) -> list[str]:
     T = result.transformation
     words = []
     for rival in result.rivals:
-        angle = se3.angle_deg(rival[:3, :3] @ T[:3, :3].T)
-        gap = float(np.linalg.norm(se3.apply(rival, middle[None]) - se3.apply(T, middle[None])))
-        words.append(f"turned by {angle:.1f}°, {gap:.2f} m away")
+        off = Tolerance.between(T, rival, se3.apply(T, middle[None])[0])
+        words.append(f"turned by {off.degrees:.1f}°, {off.metres:.2f} m away")
     return words
 
 

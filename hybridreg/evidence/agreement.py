@@ -37,7 +37,7 @@ _REACH = 1.0
 # 45 degrees.
 _SAME_NORMAL = float(np.cos(np.radians(45.0)))
 # Points added to every count of visible ones: so few agreeing points are a coincidence; by hand.
-FEW = 20.0
+PSEUDO_COUNT = 20.0
 # Without a range image a point counts as visible where the other cloud has any point within so many spacings; by hand.
 _SURROUNDED = 6.0
 
@@ -94,12 +94,12 @@ class Agreement:
     @property
     def shares(self) -> Array:
         """Agreeing share (3,) of the visible points, for each axis; few points count for little."""
-        return self.agreed / (self.looked + FEW)
+        return self.agreed / (self.looked + PSEUDO_COUNT)
 
     @property
     def looked_through(self) -> float:
         """Share of the visible points that violate free space."""
-        return float(self.through.sum() / (self.looked.sum() + FEW))
+        return float(self.through.sum() / (self.looked.sum() + PSEUDO_COUNT))
 
     @property
     def rare(self) -> tuple[float, float, float]:

@@ -8,7 +8,7 @@ from dataclasses import asdict, dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from hybridreg.evidence.agreement import FEW, Agreement
+from hybridreg.evidence.agreement import PSEUDO_COUNT, Agreement
 from hybridreg.evidence.information import Information
 
 Mask = NDArray[np.bool_]
@@ -82,8 +82,8 @@ class Evidence:
             looked_through=agreement.looked_through,
             looked_through_source=share(agreement.source.free, agreement.source.looked),
             looked_through_target=share(agreement.target.free, agreement.target.looked),
-            agreement_rare=agreed / (looked + FEW),
-            looked_through_rare=through / (looked + FEW),
+            agreement_rare=agreed / (looked + PSEUDO_COUNT),
+            looked_through_rare=through / (looked + PSEUDO_COUNT),
             agreed_rare=agreed,
             through_rare=through,
             relief_cells=float(agreement.relief.cells),

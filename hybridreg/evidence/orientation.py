@@ -16,9 +16,9 @@ from hybridreg.geometry import se3
 Array = NDArray[np.float64]
 
 # Cosine between the upward normals of two grounds below which one is upside down; by hand.
-_APART = -0.5
+_UPSIDE_DOWN = -0.5
 # Cosine above which both face up; by hand.
-_ALIKE = 0.5
+_BOTH_UP = 0.5
 # How far one ground may lie from the other's plane, as it rises and falls: in thicknesses of the ground; by hand.
 _THICK = 3.0
 # Metres more for each metre of distance; by hand.
@@ -40,9 +40,9 @@ def _under(a: View, b: View, T_b_a: Array) -> bool:
     place, other = se3.apply(T_b_a, a.centre[None])[0], b.centre
     slack = _THICK * b.thickness + _SLOPE * float(np.linalg.norm(place - other))
     cosine = float(b.ground.up @ T_b_a[:3, :3] @ a.ground.up)
-    if cosine > _ALIKE:
+    if cosine > _BOTH_UP:
         return a.image is not None and float(b.ground.above(place[None])[0]) < -slack
-    if cosine > _APART:
+    if cosine > _UPSIDE_DOWN:
         return False
     if a.ground.upright and b.ground.upright:
         return True

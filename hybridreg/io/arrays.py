@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybridreg.io.column_names import axes_in
+from hybridreg.io.coordinate_systems.length_unit import in_metres
 from hybridreg.io.faults import fault
 from hybridreg.io.meaning.first_column import FEWEST, check_first_column
 from hybridreg.io.meaning.image_shapes import check_photo, refuse_image
-from hybridreg.io.meaning.length_units import in_metres
 from hybridreg.io.record_fields import stack_axes
 
 Array = NDArray[np.float64]

@@ -16,6 +16,12 @@ _AFFIXES = (
     "point", "points", "pos", "position", "coord", "coords", "coordinate", "cartesian", "p", "xyz", "lidar", "velo",
     "sensor", "loc", "location", "points_m_xyz", "first", "1",
 )  # fmt: skip
+# What surveyors call x, y and z. Not `east` and `north`, which the prose of comments holds too.
+_SURVEY = (
+    ("easting", "eastings", "e", "utm_easting", "utm_e", "utm_x", "x_utm"),
+    ("northing", "northings", "n", "utm_northing", "utm_n", "utm_y", "y_utm"),
+    ("height", "elevation", "elev", "altitude", "h", "u", "z", "utm_z", "z_utm"),
+)
 _NAME = re.compile(r"(.*?)\s*(?:[\[(]([^\])]*)[\])]?|[/|]\s*([^/|]+)|[_ ](mm|cm|dm|m|km|ft))?")
 
 
@@ -30,7 +36,8 @@ def find_axes(names: Sequence[str], name: str) -> Axes | None:
     """x, y and z among the columns of the cloud called `name`, upper or lower case; None where nothing names them.
 
     A single column of each, or, if there is none, a single group that has x, y and z after (before) one common word,
-    such as `cartesianX`, `Points:0`, `x_coord`. A unit may follow: `X (mm)`, `x[cm]`, `y / ft`, `z_m`.
+    such as `cartesianX`, `Points:0`, `x_coord`, or a single easting, northing and height. A unit may follow: `X (mm)`,
+    `x[cm]`, `y / ft`, `z_m`.
 
     Raises
     ------
@@ -39,11 +46,12 @@ def find_axes(names: Sequence[str], name: str) -> Axes | None:
     """
     parsed = [_split(each) for each in names]
     stems = [stem for stem, _ in parsed]
-    if any(axis in stems for axis in _AXES):
-        if any(stems.count(axis) != 1 for axis in _AXES):
-            return None
+    if all(stems.count(axis) == 1 for axis in _AXES):
         return _with_unit((stems.index("x"), stems.index("y"), stems.index("z")), parsed, name)
-    groups = list(dict.fromkeys(_groups(stems)))
+    survey = _survey(stems)
+    if "x" in stems or "y" in stems or ("z" in stems and survey is None):
+        return None
+    groups = list(dict.fromkeys((*_groups(stems), *([survey] if survey else []))))
     if len(groups) > 1:
         told = " and ".join(", ".join(str(names[column]) for column in group) for group in groups[:3])
         raise fault(
@@ -102,6 +110,15 @@ def _groups(stems: Sequence[str]) -> Iterator[tuple[int, int, int]]:
                 if all(stems.count(each) == 1 for each in wanted):
                     a, b, c = (stems.index(each) for each in wanted)
                     yield a, b, c
+
+
+def _survey(stems: Sequence[str]) -> tuple[int, int, int] | None:
+    """Easting, northing and height, where only one column can be each: two heights have two meanings."""
+    fitting = [[k for k, stem in enumerate(stems) if stem in words] for words in _SURVEY]
+    if any(len(columns) != 1 for columns in fitting):
+        return None
+    (x,), (y,), (z,) = fitting
+    return x, y, z
 
 
 def _with_unit(columns: tuple[int, int, int], parsed: Sequence[tuple[str, str]], name: str) -> Axes:

@@ -13,10 +13,11 @@ from numpy.typing import NDArray
 from hybridreg.io import tables
 from hybridreg.io.arrays import TOGETHER, array_points
 from hybridreg.io.coordinate_systems.las_extended import records_of_header
-from hybridreg.io.coordinate_systems.las_units import in_metres
+from hybridreg.io.coordinate_systems.las_units import metres_of_las
+from hybridreg.io.coordinate_systems.length_unit import in_metres
 from hybridreg.io.formats.las_withheld import without_withheld
 from hybridreg.io.list_columns import listed_points
-from hybridreg.io.meaning import length_units
+from hybridreg.io.meaning.length_units import unit_given
 from hybridreg.io.recorded import ros_messages, vtk_objects
 
 Array = NDArray[np.float64]
@@ -39,7 +40,7 @@ def points_of(x: Any, name: str, depth: int = 0) -> Array:
         plain = (
             np.asarray(x) if hasattr(x, "unit") else x
         )  # astropy's quantities compare with their like alone
-        return length_units.in_metres(_from_array(plain, name), length_units.unit_given(x, name), name)
+        return in_metres(_from_array(plain, name), unit_given(x, name), name)
     if hasattr(x, "detach") and hasattr(x, "cpu"):
         return _from_torch(x, name)
     if ros_messages.is_cloud(x):
@@ -62,7 +63,7 @@ def points_of(x: Any, name: str, depth: int = 0) -> Array:
     _refuse_mesh(x, name)
     if hasattr(getattr(x, "header", None), "vlrs") and hasattr(x, "xyz"):  # laspy
         points = without_withheld(_from_array(np.asarray(x.xyz), name), getattr(x, "withheld", None), name)
-        return in_metres(points, records_of_header(x.header, name), name)
+        return metres_of_las(points, records_of_header(x.header, name), name)
     held = _held(x)
     if held is not None and depth < _DEEPEST:
         return _held_points(held, x, name, depth)
@@ -74,7 +75,7 @@ def points_of(x: Any, name: str, depth: int = 0) -> Array:
         if rows is not None:
             return points_of(rows, name, depth + 1)
     points = _from_array(_as_array(x, name), name)
-    return length_units.in_metres(points, length_units.unit_given(x, name), name)
+    return in_metres(points, unit_given(x, name), name)
 
 
 def _from_array(array: NDArray[Any], name: str, batched: bool = False) -> Array:
@@ -131,8 +132,8 @@ def _clouds_of_scene(x: Any) -> Array | None:
 def _held_points(held: Any, x: Any, name: str, depth: int) -> Array:
     points = points_of(held, name, depth + 1)
     # What lies deepest knows best, and was read in metres.
-    said = None if length_units.unit_given(held, name) else length_units.unit_given(x, name)
-    return length_units.in_metres(points, said, name)
+    said = None if unit_given(held, name) else unit_given(x, name)
+    return in_metres(points, said, name)
 
 
 def _held(x: Any) -> Any:

@@ -12,9 +12,10 @@ from numpy.typing import NDArray
 
 from hybridreg.io.arrays import array_points
 from hybridreg.io.column_names import axes_in, find_axes
+from hybridreg.io.coordinate_systems.length_unit import in_metres
 from hybridreg.io.faults import fault, shorten
 from hybridreg.io.meaning.image_shapes import refuse_image
-from hybridreg.io.meaning.length_units import in_metres, one_unit, unit_given
+from hybridreg.io.meaning.length_units import one_unit, unit_given
 from hybridreg.io.record_fields import stack_axes
 
 Array = NDArray[np.float64]

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybridreg.geometry import se3
+from hybridreg.resolution import Tolerance
 
 Array = NDArray[np.float64]
 Role = Literal["tree", "loop", "contradicts", "failed"]
@@ -68,10 +69,9 @@ def agrees(link: Link, poses: Array, middles: Array) -> bool:
     wanted = poses[link.target] @ link.T_target_source
     if not np.isfinite(wanted).all() or not np.isfinite(poses[link.source]).all():
         return False
-    step = se3.inverse(wanted) @ poses[link.source]
-    middle = middles[link.source]
-    moved = float(np.linalg.norm(se3.apply(step, middle[None])[0] - middle))
-    return moved < link.metres and se3.angle_deg(step[:3, :3]) < _DEGREES
+    centre = se3.apply(wanted, middles[link.source][None])[0]
+    off = Tolerance.between(wanted, poses[link.source], centre)
+    return off.metres < link.metres and off.degrees < _DEGREES
 
 
 def best_tree(

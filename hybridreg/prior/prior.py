@@ -11,12 +11,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from hybridreg.candidates.candidates import Candidates
 from hybridreg.geometry import se3
 from hybridreg.geometry.placement import Placement
 from hybridreg.geometry.pose_bounds import PoseBounds
 from hybridreg.io.poses.pose_file import read_pose
 from hybridreg.pair import Pair
 from hybridreg.prior import placing, size_search
+from hybridreg.spec import from_table
 
 Array = NDArray[np.float64]
 # A start is often written down with two digits: a rotation whose R R^T is off by less is meant as one.
@@ -140,10 +142,7 @@ class Prior:
         )
 
     def started(self, estimate: Any) -> Any:
-        """The estimate stage; of several recipes (`Candidates`) the start itself is the first, where there is one."""
-        from hybridreg.candidates.candidates import Candidates
-        from hybridreg.spec import from_table
-
+        """The estimate stage; of several entries (`Candidates`) the start itself is the first, where there is one."""
         if self.init is None or not isinstance(estimate, Candidates):
             return estimate
         return estimate.replace(of=({"estimate": from_table("identity", "estimate")}, *estimate.of))

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from hybridreg.evidence import match_agreement, views
 from hybridreg.evidence.log_odds import OK_LOG_ODDS
 from hybridreg.geometry import se3
+from hybridreg.resolution import Tolerance
 from hybridreg.scene import Scene
 from hybridreg.search.hypothesis import Hypothesis
 
@@ -26,7 +27,7 @@ HOPELESS = -4.0
 # Log-odds from which a pose is beyond doubt: twice those of "ok".
 BEYOND_DOUBT = 2.0 * OK_LOG_ODDS
 # Log-odds below the best pose's from which closeness no longer decides: by hand.
-_CONTENDS = 8.0
+_CLOSENESS_DECIDES = 8.0
 
 
 def best(found: Iterable[Hypothesis]) -> list[Hypothesis]:
@@ -69,7 +70,7 @@ def counted(
 def told_apart(found: Sequence[Hypothesis]) -> list[Hypothesis]:
     """The same in the same order, with their closeness where it may decide which of them is right."""
     highest = max((one.log_odds for one in found), default=0.0)
-    rows = [row for row, one in enumerate(found) if one.log_odds > highest - _CONTENDS]
+    rows = [row for row, one in enumerate(found) if one.log_odds > highest - _CLOSENESS_DECIDES]
     if len(rows) < 2 or highest < HOPELESS:
         return list(found)
     close = {row: found[row].at.closeness for row in rows}
@@ -79,6 +80,5 @@ def told_apart(found: Sequence[Hypothesis]) -> list[Hypothesis]:
 
 def differs(rival: Array, T: Array, centre: Array, spacing: float) -> bool:
     """Whether two poses (4, 4) are two answers, seen at `centre` (3,) in the target's frame."""
-    step = rival @ se3.inverse(T)
-    moved = float(np.linalg.norm(se3.apply(step, centre[None])[0] - centre))
-    return moved > _APART * spacing or se3.angle_deg(step[:3, :3]) > _TURNED
+    off = Tolerance.between(T, rival, centre)
+    return off.metres > _APART * spacing or off.degrees > _TURNED

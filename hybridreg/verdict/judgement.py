@@ -203,11 +203,9 @@ def _drawn(scene: Scene, at: PoseEvidence, found: list[Hypothesis], *, ok: bool)
     # "ok". Of some 800 poses of RANSAC and LGR on `sim:val`, with and without GICP, 16 that would be "ok" were wrong,
     # of which 15 are drawn so; 14 that would have failed were right, of which nine are.
     allowed = tolerance(scene.pair.source, scene.pair.target)
-    middle = se3.apply(at.T, at.views.middle)
+    centre = se3.apply(at.T, at.views.middle)[0]
     for T in settle.at_rest(at.views, at.T):
-        step, rest = T @ se3.inverse(at.T), PoseEvidence(at.views, T)
-        moved = float(np.linalg.norm(se3.apply(step, middle) - middle))
-        off = Tolerance(se3.angle_deg(step[:3, :3]), moved)
+        rest, off = PoseEvidence(at.views, T), Tolerance.between(at.T, T, centre)
         better = off.within(allowed) != ok and rest.by_surfaces > at.by_surfaces
         if better and (ok or _is_ok(scene, rest, found)):
             return off

@@ -15,7 +15,7 @@ from importlib.resources import files
 from typing import NamedTuple
 
 from hybridreg.evidence.evidence import NO_RIVAL, Evidence
-from hybridreg.verdict.words import FEW
+from hybridreg.verdict.words import FEWEST
 
 # The shares of right poses whose numbers are kept.
 LEVELS = (0.01, 0.05, 0.25, 0.5, 0.75, 0.95, 0.99)
@@ -65,7 +65,7 @@ def facts(evidence: Mapping[str, float]) -> dict[str, float]:
     told["overlap"] = max(evidence["visible_source"], evidence["visible_target"])
     told["lead"] = -evidence["rival_margin"]
     measured = {
-        "relief_correlation": evidence["relief_cells"] >= FEW,
+        "relief_correlation": evidence["relief_cells"] >= FEWEST,
         "matched": evidence["matched"] > 0.0,
         "lead": evidence["rival_margin"] > NO_RIVAL,
     }

@@ -22,8 +22,8 @@ AGREEMENT = 0.3
 WEAK = 0.02
 # Visible share of either cloud.
 OVERLAP = 0.15
-# Points or cells; by hand.
-FEW = 60
+# Points or cells below which a number tells nothing; by hand.
+FEWEST = 60
 
 
 def reasons(
@@ -126,7 +126,7 @@ def _inexact(slack: Tolerance | None) -> Iterator[str]:
 def _about_axis(agreement: Agreement, k: int) -> str:
     direction = " ".join(f"{x:.2f}" for x in np.round(agreement.axes[k], 2) + 0.0)  # no "-0.00"
     looked, agreed = int(agreement.looked[k]), int(agreement.agreed[k])
-    if looked < FEW:
+    if looked < FEWEST:
         return f"only {looked} points visible to both sensors face along ({direction}) of the target, {agreed} agree"
     return f"of {looked} visible points that face along ({direction}) of the target, only {agreed} agree"
 
@@ -140,7 +140,7 @@ def _in_favour(evidence: Evidence) -> str:
     cells = int(evidence.relief_cells)
     relief = (
         f"; the ground relief correlates by {evidence.relief_correlation:.2f} over {cells} cells"
-        if cells >= FEW
+        if cells >= FEWEST
         else ""
     )
     return (

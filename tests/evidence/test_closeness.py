@@ -106,7 +106,7 @@ def test_what_is_decided_already_is_not_looked_at_so_closely(
 def test_the_evidence_tells_how_much_closer_a_rival_lies(
     crossing: Made, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(ranking, "_CONTENDS", np.inf)
+    monkeypatch.setattr(ranking, "_CLOSENESS_DECIDES", np.inf)
     wrong = moved((3.0, 1.0, 0.0), 0.0, crossing.truth)
     told = [
         weigh(VoxelGrid()(crossing.scene.pair), Pose.ranked(poses)).evidence.closeness

@@ -84,7 +84,7 @@ def las(
     ],
 )
 def test_feet_become_metres_and_say_so(made: dict, across: float, up: float) -> None:
-    with pytest.warns(UserWarning, match=r"a\.las: its header says that its unit is .*0\.3048"):
+    with pytest.warns(UserWarning, match=r"a\.las: its own header says that its unit is .*0\.3048"):
         points = parse_las(las(P, **made), "a.las")
     np.testing.assert_allclose(points, P * [across, across, up], atol=1e-6)
 
@@ -163,7 +163,7 @@ def test_objects_of_laspy_tell_their_unit_too() -> None:
 
     for made in ({"keys": {1024: 1, 3076: 9002}}, {"wkt": local('"foot",0.3048'), "behind": True}):
         record = laspy.read(io.BytesIO(las(P, **made)))
-        with pytest.warns(UserWarning, match=r"cloud: its header says that its unit is 0\.3048 m"):
+        with pytest.warns(UserWarning, match=r"cloud: its own header says that its unit is 0\.3048 m"):
             np.testing.assert_allclose(PointCloud.of(record).points, P * 0.3048, atol=1e-6)
 
 

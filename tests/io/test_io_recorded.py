@@ -250,6 +250,14 @@ def test_tables_of_arrow(ending: str, tmp_path: Path) -> None:
         hr.read(path, index=0)
 
 
+def test_a_parquet_table_with_names_of_surveyors(tmp_path: Path) -> None:
+    pa, parquet = pytest.importorskip("pyarrow"), pytest.importorskip("pyarrow.parquet")
+    names = ("Northing", "Easting", "Code", "Elevation")
+    columns = (HUNDRED[:, 1], HUNDRED[:, 0], np.zeros(100), HUNDRED[:, 2])
+    parquet.write_table(pa.table(dict(zip(names, columns, strict=True))), tmp_path / "a.parquet")
+    np.testing.assert_array_equal(read_points(tmp_path / "a.parquet"), HUNDRED)
+
+
 @pytest.mark.parametrize("ending", ["obj", "stl", "off", "glb"])
 def test_a_mesh_becomes_points_of_its_surface(ending: str, tmp_path: Path) -> None:
     trimesh = pytest.importorskip("trimesh")

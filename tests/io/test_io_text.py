@@ -141,6 +141,13 @@ def test_feet_and_inches_in_a_comment():
         np.testing.assert_allclose(points, np.array([[1, 2, 3], [4, 5, 6]]) * metres)
 
 
+def test_heights_have_the_unit_that_their_own_system_gives():
+    across, up = 'LOCAL_CS["L",UNIT["foot",0.3048]]', 'VERT_CS["h",VERT_DATUM["h",2005],UNIT["metre",1]]'
+    with pytest.warns(UserWarning, match=r"its unit is 0\.3048 m across and 1 m up"):
+        points = parse_text(f'# COMPD_CS["c",{across},{up}]\n1 2 3\n4 5 6\n'.encode(), "a.txt")
+    np.testing.assert_allclose(points, np.array([[1, 2, 3], [4, 5, 6]]) * [0.3048, 0.3048, 1.0])
+
+
 def test_a_scale_is_told():
     with pytest.warns(UserWarning, match=r"a\.txt: its header says 'scale: 0\.001', which was not applied"):
         np.testing.assert_array_equal(parse_text(b"# scale: 0.001\n1 2 3\n", "a.txt"), [[1, 2, 3]])
@@ -203,7 +210,7 @@ ROWS = "1.5,2,3\n4,5,6\n7,8,9\n"
 FIRST_ROWS = {
     "its first row holds no numbers, so that it was read as the names of the columns: it has 0 fields called 'x' among "
     "'Rechtswert, Hochwert, Höhe'; name the coordinates": f"Rechtswert,Hochwert,Höhe\n{ROWS}",
-    "read as the names of the columns: it has 0 fields called 'x' among 'E, N, H'": f"E,N,H\n{ROWS}",
+    "read as the names of the columns: it has 0 fields called 'x' among 'E, N, D'": f"E,N,D\n{ROWS}",
     "its first 3000 rows hold no points, from 'key0: value' on; begin those that are comments with #": "".join(
         f"key{k}: value\n" for k in range(3000)
     )
@@ -223,6 +230,52 @@ def test_a_first_row_without_numbers_is_named_as_the_cause(message, encoding):
     with pytest.raises(ValueError, match=r"a\.txt: ") as caught:
         parse_text(FIRST_ROWS[message].encode(encoding), "a.txt")
     assert message in str(caught.value)
+
+
+SURVEYED = {
+    "Easting,Northing,Height": "Easting,Northing,Height\n1,2,3\n4,5,6\n",
+    "northing first, other columns": "ID;Northing;Easting;Elevation;Code\n9;2;1;3;7\n8;5;4;6;7\n",
+    "E N H in a comment": "# E N H\n1 2 3\n4 5 6\n",
+    "E, N and z": "point,E,N,Z\nA,1,2,3\nB,4,5,6\n",
+    "X_UTM": "X_UTM,Y_UTM,Elevation,lat,lon\n1,2,3,50,7\n4,5,6,50,7\n",
+}
+
+
+@pytest.mark.parametrize("style", SURVEYED)
+def test_names_of_surveyors_are_x_y_and_z(style):
+    points = parse_text(SURVEYED[style].encode(), "a.csv")
+    np.testing.assert_array_equal(points, [[1, 2, 3], [4, 5, 6]])
+
+
+def test_feet_of_surveyors_become_metres():
+    with pytest.warns(UserWarning, match=r"its unit is 0\.3048 m"):
+        points = parse_text(b"Easting (ft),Northing (ft),Elevation (ft)\n1,2,3\n4,5,6\n", "a.csv")
+    np.testing.assert_allclose(points, np.array([[1, 2, 3], [4, 5, 6]]) * 0.3048)
+
+
+AMBIGUOUS = {
+    "two heights": ("Easting,Northing,Height,Elevation", "0 fields called 'x'"),
+    "two eastings": ("E,Easting,N,H", "0 fields called 'x'"),
+    "no height": ("Easting,Northing,Code,Id", "0 fields called 'x'"),
+    "a depth, whose sign is open": ("Easting,Northing,Depth,Id", "0 fields called 'x'"),
+    "a box, not a height": ("x,y,width,height", "0 fields called 'z'"),
+    "heights in feet on metres": ("Easting (m),Northing (m),Height (ft),Id", "differ: m, m, ft"),
+    "a sensor's own frame beside": ("E,N,H,lidar_x,lidar_y,lidar_z", "several columns that could be"),
+}
+
+
+@pytest.mark.parametrize("style", AMBIGUOUS)
+def test_names_of_surveyors_that_have_two_meanings_are_told(style):
+    names, message = AMBIGUOUS[style]
+    rows = (",".join(str(k) for k in range(names.count(",") + 1)) + "\n") * 30
+    with pytest.raises(ValueError, match=r"a\.csv: ") as caught:
+        parse_text(f"{names}\n{rows}".encode(), "a.csv")
+    assert message in str(caught.value)
+
+
+def test_x_y_and_z_go_before_names_of_surveyors():
+    text = b"x,y,z,Easting,Northing,Height\n1,2,3,7,8,9\n4,5,6,7,8,9\n"
+    np.testing.assert_array_equal(parse_text(text, "a.csv"), [[1, 2, 3], [4, 5, 6]])
 
 
 def test_a_range_first_is_refused_and_a_ring_first_is_told():

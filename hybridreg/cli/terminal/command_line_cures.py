@@ -24,6 +24,7 @@ CURES = (
         r"insist with untrained=True",
         ("insist with --set SLOT.untrained=true", "insist with untrained = true"),
     ),
+    (r", or change a pipeline by its own method replace", ("",)),
     (r"use device='cpu'", ("use --set SLOT.device=cpu", 'use device = "cpu"')),
     (r"use accelerator='cpu'", ("use --accelerator cpu",)),
     (

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybridreg.io.coordinate_systems.geo_keys import unit_of_keys
-from hybridreg.io.coordinate_systems.length_unit import LengthUnit
+from hybridreg.io.coordinate_systems.length_unit import LengthUnit, in_metres
 from hybridreg.io.coordinate_systems.well_known_text import unit_of_text
 from hybridreg.io.faults import fault
 
@@ -21,7 +21,7 @@ WELL_KNOWN_TEXT = 2112
 """The id of the record that holds a system's well-known text."""
 
 
-def in_metres(points: Array, records: Iterable[Any], name: str) -> Array:
+def metres_of_las(points: Array, records: Iterable[Any], name: str) -> Array:
     """The points (N, 3) of a LAS file with those variable length records (laspy's), in metres.
 
     Raises
@@ -37,13 +37,7 @@ def in_metres(points: Array, records: Iterable[Any], name: str) -> Array:
             f"{name}: its coordinate system, {unit.unknown}, gives no unit that is known here; what it does not give "
             "was taken for metres: convert it to metres first where it is in feet"
         )
-    if unit.across == 1.0 and unit.up == 1.0:
-        return points
-    _warn(
-        f"{name}: its header says that its unit is {unit.across:.6g} m across and {unit.up:.6g} m up; it was read in "
-        "metres, and the pose is in metres too"
-    )
-    return points * (unit.across, unit.across, unit.up)
+    return in_metres(points, unit.across, name, up=unit.up)
 
 
 def told(records: Iterable[Any]) -> LengthUnit:

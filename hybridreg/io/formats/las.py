@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybridreg.io.coordinate_systems.las_extended import extended_records
-from hybridreg.io.coordinate_systems.las_units import in_metres
+from hybridreg.io.coordinate_systems.las_units import metres_of_las
 from hybridreg.io.faults import fault, foreign_parser
 from hybridreg.io.formats.las_header import check_las_header
 from hybridreg.io.formats.las_withheld import without_withheld
@@ -44,7 +44,7 @@ def parse_las(data: bytes, name: str) -> NDArray[np.float64]:
     if len(points) != promise.points:
         raise fault(name, f"its header promises {promise.points} points, it holds {len(points)}")
     points = without_withheld(points, withheld, name)
-    return in_metres(points, chain(records, extended_records(data, name)), name)
+    return metres_of_las(points, chain(records, extended_records(data, name)), name)
 
 
 def _axes(chunk: Any) -> tuple[NDArray[np.float64], ...]:

@@ -12,11 +12,12 @@ from numpy.typing import NDArray
 from hybridreg.io import tables
 from hybridreg.io.arrays import array_points
 from hybridreg.io.column_names import find_axes
+from hybridreg.io.coordinate_systems.length_unit import in_metres
 from hybridreg.io.faults import fault, foreign_parser
 from hybridreg.io.formats.npy import array_of_npy, npy_header
 from hybridreg.io.meaning.first_column import FEWEST
 from hybridreg.io.meaning.image_shapes import is_image
-from hybridreg.io.meaning.length_units import in_metres, unit_given
+from hybridreg.io.meaning.length_units import unit_given
 
 _UNITS = ("unit", "units", "length_unit")
 _KEYS = ("xyz", "points", "arr_0")

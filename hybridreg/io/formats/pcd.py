@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybridreg.io.arrays import TOGETHER
+from hybridreg.io.coordinate_systems.length_unit import LengthUnit
 from hybridreg.io.faults import fault
 from hybridreg.io.formats.lzf import lzf_decompress
 from hybridreg.io.formats.pcd_header import PcdHeader, parse_pcd_header
@@ -71,7 +72,8 @@ def pcd_viewpoint(data: bytes, name: str) -> NDArray[np.float64] | None:
     header = parse_pcd_header(data, name)
     if header.viewpoint is None:
         return None
-    return np.array(header.viewpoint) * (unit_in(header.comments, name) or 1.0)
+    unit = unit_in(header.comments, name) or LengthUnit()
+    return np.array(header.viewpoint) * (unit.across, unit.across, unit.up)
 
 
 def _ascii_points(

@@ -9,13 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybridreg.io.column_names import Axes
+from hybridreg.io.coordinate_systems.length_unit import in_metres
 from hybridreg.io.faults import fault
 from hybridreg.io.formats.text_first_row import axes_of_first_row
 from hybridreg.io.formats.text_names import axes_in_comments, is_number, names_in
 from hybridreg.io.formats.text_rows import parse_rows, text_lines, without_counts
 from hybridreg.io.meaning.first_column import check_first_column, looked_at, refuse_row_numbers
 from hybridreg.io.meaning.image_shapes import refuse_image
-from hybridreg.io.meaning.length_units import as_commented, in_metres
+from hybridreg.io.meaning.length_units import as_commented
 from hybridreg.io.signatures import looks_binary
 
 _COMMENTS = ("#", "//", "%", ";")

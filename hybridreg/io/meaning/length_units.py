@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from hybridreg.io.coordinate_systems.length_unit import LengthUnit, in_metres
 from hybridreg.io.coordinate_systems.well_known_text import unit_of_text
 from hybridreg.io.faults import fault, shorten
 
@@ -60,8 +61,8 @@ _DICTIONARIES = ("attrs", "metadata")
 _KEYS = ("unit", "units", "length_unit")
 
 
-def unit_said(text: str, name: str) -> float | None:
-    """Metres of the unit that a comment such as `unit: mm` names for x, y and z; None where it names no known one.
+def unit_said(text: str, name: str) -> LengthUnit | None:
+    """The unit that a comment such as `unit: mm` names for x, y and z; None where it names no known one.
 
     Raises
     ------
@@ -79,7 +80,8 @@ def unit_said(text: str, name: str) -> float | None:
             and what not in _OF_OTHERS
             and (what in _OF_POINTS or word.lower() not in ANGLES)
         ):
-            return metres_of(word, name)
+            metres = metres_of(word, name)
+            return None if metres is None else LengthUnit(metres, metres)
     return None
 
 
@@ -147,32 +149,20 @@ def as_commented(points: Array, comments: Iterable[str], name: str) -> Array:
                 UserWarning,
                 stacklevel=3,
             )
-    return in_metres(points, unit_in(lines, name), name)
+    unit = unit_in(lines, name) or LengthUnit()
+    return in_metres(points, unit.across, name, up=unit.up)
 
 
-def unit_in(comments: Iterable[str], name: str) -> float | None:
-    """Metres of the first unit that comments name, as `unit_said`."""
+def unit_in(comments: Iterable[str], name: str) -> LengthUnit | None:
+    """The first unit that comments name, as `unit_said`."""
     return next((said for line in comments if (said := unit_said(line, name)) is not None), None)
 
 
-def in_metres(points: Array, metres: float | None, name: str) -> Array:
-    """Points (N, 3) whose unit has so many metres, in metres; warns where that changes them, since their pose will."""
-    if metres is None or metres == 1.0:
-        return points
-    warnings.warn(
-        f"{name}: its own header says that its unit is {metres:.6g} m; it was read in metres, and the pose is in "
-        "metres too",
-        UserWarning,
-        stacklevel=3,
-    )
-    return points * metres
-
-
-def _of_system(text: str, name: str) -> float | None:
+def _of_system(text: str, name: str) -> LengthUnit | None:
     unit = unit_of_text(text)
     if unit.degrees:  # longitude and latitude, whatever the unit of heights is
-        return metres_of("degree", name)
-    return None if unit.unknown else unit.across
+        metres_of("degree", name)
+    return None if unit.unknown else unit
 
 
 def _number(text: str) -> float:
