@@ -14,7 +14,7 @@ from hybridreg.scene import Scene
 from hybridreg.search import settle
 from hybridreg.search.axis_turns import TURNS, poses
 from hybridreg.search.hypothesis import Hypothesis, as_hypotheses, parted, seen_at
-from hybridreg.search.near_copies import near_copies
+from hybridreg.search.near_copies import are_two_places, near_copies
 from hybridreg.search.ranking import best, differs, distinct, with_matches
 from hybridreg.search.repeats import copies
 
@@ -51,11 +51,7 @@ def find(scene: Scene, own: Hypothesis, pose: Pose) -> list[Hypothesis]:
     guessed = [one.T for one in likeliest if not one.settled]
     guessed += [T for T in turned[:_FULLEST] if is_rival(T)]
     moved = seen_at(scene, settle.settle(views, np.array(guessed).reshape(-1, 4, 4)), _CLOSE)
-    allowed = tolerance(scene.pair.source, scene.pair.target)
-    likely = own.log_odds > -_CONTENDS
-    copied = near_copies(views, own.T, own.at.agreement.axes, allowed) if likely else []
-    beside = seen_at(scene, copied, _CLOSE)
-    rivals = [*(one for one in likeliest if one.settled), *moved, *beside]
+    rivals = [*(one for one in likeliest if one.settled), *moved]
     # Guesses that come back to the pose are no rivals, and two that meet are one; neither must hide those behind them.
     apart = distinct(scene, (with_matches(scene, one) for one in rivals if is_rival(one.T)))[:_ENOUGH]
 
@@ -63,8 +59,22 @@ def find(scene: Scene, own: Hypothesis, pose: Pose) -> list[Hypothesis]:
         # Where surfaces hold a pose loosely, a rival may have stopped on its way to it.
         return one.log_odds < own.log_odds - _CONTENDS or is_rival(settle_closely(views.fine, one.T))
 
-    near = best(with_matches(scene, one) for one in beside if not is_rival(one.T))[:1]
-    return [*(one for one in apart if came_to_rest(one)), *near]
+    beside = [one for one in _beside(scene, own) if not is_rival(one.T)]
+    return [*(one for one in apart if came_to_rest(one)), *beside]
+
+
+def _beside(scene: Scene, own: Hypothesis) -> list[Hypothesis]:
+    # The likeliest copy of the place that is nearer than a rival, if any contends.
+    if own.log_odds < -_CONTENDS:
+        return []
+    views, allowed = own.at.views, tolerance(scene.pair.source, scene.pair.target)
+    beside = seen_at(scene, near_copies(views, own.T, own.at.agreement.axes, allowed), _CLOSE)
+    likeliest = best(with_matches(scene, one) for one in beside)[:1]
+    return [
+        one
+        for one in likeliest
+        if one.log_odds > own.log_odds - _CONTENDS and are_two_places(views, own.T, one.T)
+    ]
 
 
 def _turned(own: PoseEvidence) -> Array:
