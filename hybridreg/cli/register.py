@@ -64,7 +64,6 @@ def command(
     """Align two point clouds; print the pose, the verdict on it, and the seconds of each stage."""
     from hybridreg.changes import build
     from hybridreg.cloud import PointCloud
-    from hybridreg.io.point_files import selection_for
     from hybridreg.pair import Pair
 
     options.check_form(form)
@@ -76,7 +75,7 @@ def command(
     if known:
         changes["prior"] = {**changes.get("prior", {}), **known}
     method = build(changes)
-    select = options.selections(topic, index, at, accumulate)
+    select = options.selections((source, target), topic, index, at, accumulate)
     missing: Literal["raise", "drop"] = "drop" if nonfinite is NonFinite.drop else "raise"
     clouds = [
         PointCloud.of(
@@ -84,7 +83,7 @@ def command(
             name=name,
             nonfinite=missing,
             viewpoint=options.viewpoint(place, f"--{name}-viewpoint"),
-            select=selection_for(path, choice),
+            select=choice,
         )
         for name, path, place, choice in zip(
             ("source", "target"), (source, target), (source_viewpoint, target_viewpoint), select, strict=True

@@ -41,7 +41,6 @@ def command(
     from hybridreg.eval.report import orbit_view
     from hybridreg.geometry import se3
     from hybridreg.io import write_text
-    from hybridreg.io.point_files import selection_for
     from hybridreg.io.poses.pose_file import read_pose
     from hybridreg.pair import Pair
     from hybridreg.prior.placing import sized
@@ -51,9 +50,9 @@ def command(
     T = np.eye(4)
     if pose is not None:
         T = se3.rounded(read_pose(pose), str(pose), _ROUNDED)
-    select = options.selections(topic, index, at, accumulate)
+    select = options.selections((source, target), topic, index, at, accumulate)
     moving, still = (
-        PointCloud.of(path, name=name, nonfinite="drop", select=selection_for(path, choice))
+        PointCloud.of(path, name=name, nonfinite="drop", select=choice)
         for name, path, choice in zip(("source", "target"), (source, target), select, strict=True)
     )
     pair = Pair.of(sized(moving, _scale(pose)), still)

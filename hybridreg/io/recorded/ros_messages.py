@@ -42,7 +42,7 @@ def points(message: Any, name: str) -> Array:
     rows, columns, size = int(message.height), int(message.width), int(message.point_step)
     if rows * columns == 0:
         return np.empty((0, 3))
-    data = _bytes(message.data, name)
+    data = as_bytes(message.data, name)
     step = _row_step(message, data, name)
     record = _record(message, name)
     return array_points(np.ndarray((rows, columns), record, data, 0, (step, size)).ravel(), name)
@@ -55,12 +55,19 @@ def _object(message: Any) -> Any:
     return SimpleNamespace(**{"is_bigendian": False, **message, "fields": fields})
 
 
-def _bytes(raw: Any, name: str) -> NDArray[np.uint8]:
+def as_bytes(raw: Any, name: str) -> NDArray[np.uint8]:
+    """The data of a message as numbers; text is base64, as JSON has it.
+
+    Raises
+    ------
+    ValueError
+        Text that is no base64.
+    """
     if isinstance(raw, str):
         try:
             raw = base64.b64decode(raw, validate=True)
         except (binascii.Error, ValueError) as error:
-            problem = f"the data of a PointCloud2 are text, but not base64: {shorten(raw)}"
+            problem = f"the data of a cloud are text, but not base64: {shorten(raw)}"
             raise fault(name, problem, "give them as bytes") from error
     if isinstance(raw, (bytes, bytearray, memoryview)):
         return np.frombuffer(raw, np.uint8)

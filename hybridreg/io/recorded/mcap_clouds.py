@@ -1,31 +1,32 @@
 # SPDX-License-Identifier: MIT
-"""Clouds in MCAP files that no ROS wrote: Foxglove's own message `foxglove.PointCloud`, in protobuf, through `mcap`."""
+"""Clouds in MCAP files that do not say that ROS 2 wrote them, through `mcap`: Foxglove's own, and those of ROS in files
+that were merged, converted, or written by a library of MCAP."""
 
 from __future__ import annotations
 
 from itertools import islice
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from hybridreg.io.faults import fault, foreign_parser
-from hybridreg.io.recorded import ros_messages
-from hybridreg.io.recorded.recording import Recorded, Selection, chosen_topic
+from hybridreg.io.recorded import foxglove_message, livox_message, ros_messages
+from hybridreg.io.recorded.recording import RECOVER, Recorded, Selection, check_filled, chosen_topic
 from hybridreg.runtime.optional_packages import load
 
 Array = NDArray[np.float64]
-_CLOUD = ("foxglove.PointCloud", "protobuf")
+_FOXGLOVE, _ROS = "foxglove.PointCloud", "sensor_msgs/msg/PointCloud2"
+_KINDS = (
+    *((_FOXGLOVE, encoding) for encoding in ("protobuf", "json")),
+    *((message, encoding) for message in (_ROS, *livox_message.KINDS) for encoding in ("cdr", "ros1")),
+)
 _CURE = (
-    "Foxglove's own clouds are read where they are in protobuf, and PointCloud2 where the file's profile is ros2, as "
-    "`ros2 bag record` writes it"
+    "clouds are read as foxglove.PointCloud in protobuf or JSON, and as PointCloud2 or Livox's CustomMsg as ROS writes "
+    "them"
 )
 _MAGIC, _HEADER, _LENGTH = b"\x89MCAP0\r\n", b"\x01", 8
-# foxglove.PackedElementField's types as sensor_msgs/PointField's.
-_AS_ROS = {1: 2, 2: 1, 3: 4, 4: 3, 5: 6, 6: 5, 7: 7, 8: 8}
 _NANOSECONDS = 1e9
 
 
@@ -40,8 +41,8 @@ def is_ros(path: Path) -> bool:
     return head[start + 4 : start + 4 + length] == b"ros2"
 
 
-def read_foxglove(path: Path, selection: Selection) -> Recorded:
-    """Read clouds of one topic, each moved to its frame by the message's own pose.
+def read_mcap(path: Path, selection: Selection) -> Recorded:
+    """Read clouds of one topic, one of Foxglove's moved to its frame by the message's own pose.
 
     Raises
     ------
@@ -53,9 +54,8 @@ def read_foxglove(path: Path, selection: Selection) -> Recorded:
     """
     name = str(path)
     make = load("mcap.reader", f"{name}: an MCAP file").make_reader
-    factory = load("mcap_protobuf.decoder", f"{name}: an MCAP file").DecoderFactory()
     with path.open("rb") as file:
-        with foreign_parser(name, "an MCAP file"):
+        with foreign_parser(name, "an MCAP file", RECOVER):
             reader = make(file)
             summary = reader.get_summary()
         counts, others = _topics(summary, name)
@@ -67,23 +67,20 @@ def read_foxglove(path: Path, selection: Selection) -> Recorded:
         else:
             first = selection.first_of(counts[topic], name, "clouds of this topic")
         told = reader.iter_messages(topics=[topic])
-        clouds = (each for each in told if _kind(*each[:2]) == _CLOUD and each[2].log_time >= begin)
-        with foreign_parser(name, "an MCAP file"):
-            chosen = [
-                factory.decoder_for("protobuf", schema)(message.data)
-                for schema, _, message in islice(clouds, first, first + selection.accumulate)
-            ]
+        clouds = (each for each in told if _kind(*each[:2]) in _KINDS and each[2].log_time >= begin)
+        with foreign_parser(name, "an MCAP file", RECOVER):
+            chosen = list(islice(clouds, first, first + selection.accumulate))
     if len(chosen) < selection.accumulate:
         problem = f"holds {len(chosen)} clouds of this topic from {selection.at or 0:g} s on"
         cure = f"it lasts {(end - start) / _NANOSECONDS:.1f} s, choose an earlier time"
         raise fault(name, f"{problem}, {selection.accumulate} were asked for", cure)
-    return _laid_together([(_points(each, name), *_pose(each)) for each in chosen])
+    return check_filled(_laid_together([_cloud(*each, name) for each in chosen]), name)
 
 
 def _topics(summary: Any, name: str) -> tuple[dict[str, int], set[str]]:
     # The number of clouds of each topic, and the kinds of what else there is.
     if summary is None or summary.statistics is None or not summary.statistics.channel_message_counts:
-        raise fault(name, "has no index", "write it to its end, or run `mcap recover` on it")
+        raise fault(name, "has no index", f"write it to its end, or {RECOVER}")
     counts: dict[str, int] = {}
     others: set[str] = set()
     for number, count in summary.statistics.channel_message_counts.items():
@@ -91,7 +88,7 @@ def _topics(summary: Any, name: str) -> tuple[dict[str, int], set[str]]:
         if channel is None:
             continue
         kind = _kind(summary.schemas.get(channel.schema_id), channel)
-        if kind == _CLOUD:
+        if kind in _KINDS:
             counts[channel.topic] = counts.get(channel.topic, 0) + count
         else:
             others.add(" in ".join(kind))
@@ -99,35 +96,35 @@ def _topics(summary: Any, name: str) -> tuple[dict[str, int], set[str]]:
 
 
 def _kind(schema: Any, channel: Any) -> tuple[str, str]:
-    return (schema.name if schema else "no schema", channel.message_encoding)
+    # ROS 1 calls its messages as ROS 2 does, without "msg" between.
+    message = schema.name if schema else "no schema"
+    if channel.message_encoding == "ros1":
+        message = "/msg/".join(message.split("/")) if message.count("/") == 1 else message
+    return message, channel.message_encoding
 
 
-def _points(message: Any, name: str) -> Array:
-    stride, size = int(message.point_stride), len(message.data)
-    if stride < 1 or size % stride:
-        problem = f"a foxglove.PointCloud of {size} bytes has points of {stride}"
-        raise fault(name, problem, "take the message again")
-    as_ros = SimpleNamespace(
-        fields=[
-            SimpleNamespace(name=f.name, offset=f.offset, datatype=_AS_ROS.get(f.type, 0))
-            for f in message.fields
-        ],
-        is_bigendian=False,
-        point_step=stride,
-        row_step=0,
-        height=1,
-        width=size // stride,
-        data=message.data,
-    )
-    return ros_messages.points(as_ros, name)
+def _cloud(schema: Any, channel: Any, message: Any, name: str) -> tuple[Array, Array, Array]:
+    # Points as they are, and the pose that they are to be moved by.
+    kind, encoding = _kind(schema, channel)
+    if kind in livox_message.KINDS:
+        return livox_message.points(message.data, cdr=encoding == "cdr", name=name), np.eye(3), np.zeros(3)
+    with foreign_parser(name, "an MCAP file"):
+        read = _decoded(kind, encoding, schema, message.data, name)
+    if kind == _ROS:
+        return ros_messages.points(read, name), np.eye(3), np.zeros(3)
+    return foxglove_message.points(read, name), *foxglove_message.pose(read)
 
 
-def _pose(message: Any) -> tuple[Array, Array]:
-    # Rotation and position; the identity where none was set: protobuf's zeros are no rotation.
-    p, q = message.pose.position, message.pose.orientation
-    turn = np.array([q.x, q.y, q.z, q.w])
-    R = Rotation.from_quat(turn).as_matrix() if turn.any() else np.eye(3)
-    return R, np.array([p.x, p.y, p.z])
+def _decoded(kind: str, encoding: str, schema: Any, data: bytes, name: str) -> Any:
+    if encoding == "json":
+        return foxglove_message.of_json(data)
+    if encoding == "protobuf":
+        factory = load("mcap_protobuf.decoder", f"{name}: an MCAP file").DecoderFactory()
+        return factory.decoder_for("protobuf", schema)(data)
+    typesys = load("rosbags.typesys", f"{name}: a message of ROS")
+    if encoding == "ros1":
+        return typesys.get_typestore(typesys.Stores.ROS1_NOETIC).deserialize_ros1(data, kind)
+    return typesys.get_typestore(typesys.Stores.ROS2_HUMBLE).deserialize_cdr(data, kind)
 
 
 def _laid_together(clouds: list[tuple[Array, Array, Array]]) -> Recorded:
