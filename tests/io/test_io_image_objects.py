@@ -112,10 +112,5 @@ def test_what_is_no_image_is_refused_with_a_cure_that_works(wrong: Any, word: st
 @pytest.mark.parametrize("high, told", [(1023, True), (4095, True), (65535, False), (0, False)])
 def test_twelve_bits_in_sixteen_are_told(high: int, told: bool, recwarn: pytest.WarningsRecorder) -> None:
     as_image((RGB.astype(np.uint32) * high // RGB.max()).astype(np.uint16))
-    assert [str(each.message) for each in recwarn] == (
-        [
-            f"image: the values of its 16 bits reach {high} of 65535, which is nearly black; scale them to the full range"
-        ]
-        if told
-        else []
-    )
+    words = f"image: the values of its 16 bits reach {high} of 65535, which is nearly black"
+    assert [str(each.message).partition(";")[0] for each in recwarn] == ([words] if told else [])
