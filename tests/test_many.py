@@ -197,7 +197,7 @@ def test_clouds_of_a_batch_are_named_one_by_one_or_by_patterns(tmp_path: Path) -
     (tmp_path / "s.bag").mkdir()
     (tmp_path / "s.bag" / "metadata.yaml").write_text("")
     pattern, target = str(tmp_path / "s*"), tmp_path / "map.ply"
-    assert [job.id for job in jobs_of([pattern], target)] == ["s", "s9", "s10", "s[1]"]
+    assert [job.id for job in jobs_of([pattern], target)] == ["s9", "s10", "s", "s[1]"]
     assert [job.id for job in jobs_of([pattern + ".csv"], target)] == ["s9", "s10", "s[1]"]
     named = [str(tmp_path / "s[1].csv"), str(tmp_path / "s10.csv")]
     assert [job.source for job in jobs_of(named, target)] == named
