@@ -14,11 +14,17 @@ from numpy.typing import NDArray
 from hybridreg.io.faults import FETCH_AGAIN, fault, foreign_parser
 from hybridreg.io.recorded import livox_message, ros_messages
 from hybridreg.io.recorded.mcap_clouds import is_ros, read_mcap
-from hybridreg.io.recorded.recording import RECOVER, Recorded, Selection, check_filled, chosen_topic
+from hybridreg.io.recorded.recording import (
+    CLOUDS_OF_ROS,
+    RECOVER,
+    Recorded,
+    Selection,
+    check_filled,
+    chosen_topic,
+)
 from hybridreg.runtime.optional_packages import load
 
 Array = NDArray[np.float64]
-_CLOUD = "sensor_msgs/msg/PointCloud2"
 _NANOSECONDS = 1e9
 # What may mend a recording that was cut off, by the ending of its file.
 _CURES = {
@@ -29,8 +35,8 @@ _ZSTD = b"\x28\xb5\x2f\xfd"
 
 
 def read_bag(path: Path, selection: Selection) -> Recorded:
-    """Read clouds of one topic: `sensor_msgs/PointCloud2` of any layout, Livox's `CustomMsg`, and in MCAP
-    files `foxglove.PointCloud`.
+    """Read clouds of one topic: `sensor_msgs/PointCloud2` of any layout, `PointCloud`, `LaserScan`, Livox's
+    `CustomMsg`, and in MCAP files `foxglove.PointCloud`.
 
     Parameters
     ----------
@@ -89,13 +95,12 @@ def _check_ending(path: Path) -> None:
 def _of_topic(reader: Any, topic: str | None, name: str) -> list[Any]:
     found: dict[str, list[Any]] = {}
     for connection in reader.connections:
-        if connection.msgtype in (_CLOUD, *livox_message.KINDS):
+        if connection.msgtype in (*ros_messages.KINDS, *livox_message.KINDS):
             found.setdefault(connection.topic, []).append(connection)
     counts = {each: sum(c.msgcount for c in found[each]) for each in found}
     others = [connection.msgtype for connection in reader.connections]
-    return found[
-        chosen_topic(counts, topic, others, name, "give a bag with PointCloud2 or Livox's CustomMsg")
-    ]
+    flat = [each.topic for each in reader.connections if each.msgtype == ros_messages.FLAT]
+    return found[chosen_topic(counts, topic, others, name, f"clouds are {CLOUDS_OF_ROS}", flat)]
 
 
 def _clouds(reader: Any, chosen: list[Any], name: str) -> Iterator[Array]:

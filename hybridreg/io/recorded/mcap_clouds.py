@@ -13,19 +13,27 @@ from numpy.typing import NDArray
 
 from hybridreg.io.faults import fault, foreign_parser
 from hybridreg.io.recorded import foxglove_message, livox_message, ros_messages
-from hybridreg.io.recorded.recording import RECOVER, Recorded, Selection, check_filled, chosen_topic
+from hybridreg.io.recorded.recording import (
+    CLOUDS_OF_ROS,
+    RECOVER,
+    Recorded,
+    Selection,
+    check_filled,
+    chosen_topic,
+)
 from hybridreg.runtime.optional_packages import load
 
 Array = NDArray[np.float64]
-_FOXGLOVE, _ROS = "foxglove.PointCloud", "sensor_msgs/msg/PointCloud2"
+_FOXGLOVE = "foxglove.PointCloud"
 _KINDS = (
     *((_FOXGLOVE, encoding) for encoding in ("protobuf", "json")),
-    *((message, encoding) for message in (_ROS, *livox_message.KINDS) for encoding in ("cdr", "ros1")),
+    *(
+        (message, encoding)
+        for message in (*ros_messages.KINDS, *livox_message.KINDS)
+        for encoding in ("cdr", "ros1")
+    ),
 )
-_CURE = (
-    "clouds are read as foxglove.PointCloud in protobuf or JSON, and as PointCloud2 or Livox's CustomMsg as ROS writes "
-    "them"
-)
+_CURE = f"clouds are foxglove.PointCloud in protobuf or JSON, and as ROS writes them {CLOUDS_OF_ROS}"
 _MAGIC, _HEADER, _LENGTH = b"\x89MCAP0\r\n", b"\x01", 8
 _NANOSECONDS = 1e9
 
@@ -58,8 +66,8 @@ def read_mcap(path: Path, selection: Selection) -> Recorded:
         with foreign_parser(name, "an MCAP file", RECOVER):
             reader = make(file)
             summary = reader.get_summary()
-        counts, others = _topics(summary, name)
-        topic = chosen_topic(counts, selection.topic, others, name, _CURE)
+        counts, flat, others = _topics(summary, name)
+        topic = chosen_topic(counts, selection.topic, others, name, _CURE, flat)
         start, end = summary.statistics.message_start_time, summary.statistics.message_end_time
         first, begin = 0, start
         if selection.at is not None:
@@ -74,14 +82,16 @@ def read_mcap(path: Path, selection: Selection) -> Recorded:
         problem = f"holds {len(chosen)} clouds of this topic from {selection.at or 0:g} s on"
         cure = f"it lasts {(end - start) / _NANOSECONDS:.1f} s, choose an earlier time"
         raise fault(name, f"{problem}, {selection.accumulate} were asked for", cure)
-    return check_filled(_laid_together([_cloud(*each, name) for each in chosen]), name)
+    clouds_at = [_cloud(schema, channel, message, name) for schema, channel, message in chosen]
+    return check_filled(_laid_together(clouds_at), name)
 
 
-def _topics(summary: Any, name: str) -> tuple[dict[str, int], set[str]]:
-    # The number of clouds of each topic, and the kinds of what else there is.
+def _topics(summary: Any, name: str) -> tuple[dict[str, int], set[str], set[str]]:
+    # The number of clouds of each topic, which of them are of 2-D scanners, and the kinds of what else there is.
     if summary is None or summary.statistics is None or not summary.statistics.channel_message_counts:
         raise fault(name, "has no index", f"write it to its end, or {RECOVER}")
     counts: dict[str, int] = {}
+    flat: set[str] = set()
     others: set[str] = set()
     for number, count in summary.statistics.channel_message_counts.items():
         channel = summary.channels.get(number)
@@ -90,9 +100,10 @@ def _topics(summary: Any, name: str) -> tuple[dict[str, int], set[str]]:
         kind = _kind(summary.schemas.get(channel.schema_id), channel)
         if kind in _KINDS:
             counts[channel.topic] = counts.get(channel.topic, 0) + count
+            flat.update([channel.topic] if kind[0] == ros_messages.FLAT else [])
         else:
             others.add(" in ".join(kind))
-    return counts, others
+    return counts, flat, others
 
 
 def _kind(schema: Any, channel: Any) -> tuple[str, str]:
@@ -110,7 +121,7 @@ def _cloud(schema: Any, channel: Any, message: Any, name: str) -> tuple[Array, A
         return livox_message.points(message.data, cdr=encoding == "cdr", name=name), np.eye(3), np.zeros(3)
     with foreign_parser(name, "an MCAP file"):
         read = _decoded(kind, encoding, schema, message.data, name)
-    if kind == _ROS:
+    if kind in ros_messages.KINDS:
         return ros_messages.points(read, name), np.eye(3), np.zeros(3)
     return foxglove_message.points(read, name), *foxglove_message.pose(read)
 

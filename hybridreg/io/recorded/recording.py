@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, fields
 from numbers import Integral, Real
 from typing import Any, NamedTuple
@@ -17,6 +17,9 @@ Array = NDArray[np.float64]
 
 RECOVER = "run `mcap recover` on it"
 """What to do with an MCAP file whose recording was cut off."""
+
+CLOUDS_OF_ROS = "PointCloud2, PointCloud, LaserScan and Livox's CustomMsg"
+"""What is read of messages of ROS."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -88,9 +91,15 @@ ANY = Selection()
 
 
 def chosen_topic(
-    counts: Mapping[str, int], asked: str | None, others: Iterable[str], name: str, cure: str
+    counts: Mapping[str, int],
+    asked: str | None,
+    others: Iterable[str],
+    name: str,
+    cure: str,
+    flat: Collection[str] = (),
 ) -> str:
-    """The topic whose clouds are read, by the number of clouds of each; `others` are the kinds of what else there is.
+    """The topic whose clouds are read, by the number of clouds of each; `others` are the kinds of what else there is,
+    `flat` the topics of 2-D scanners: beside clouds in space they are read where they are asked for.
 
     Raises
     ------
@@ -101,11 +110,14 @@ def chosen_topic(
     if not counts:
         rest = ", ".join(sorted(set(others))[:8]) or "nothing at all"
         raise fault(name, f"holds no clouds, but {rest}", cure)
-    if asked is None and len(counts) > 1:
+    if asked is not None:
+        if asked not in counts:
+            raise fault(name, f"holds no clouds of the topic {asked!r}", f"it has {told}")
+        return asked
+    likely = [each for each in counts if each not in flat] or list(counts)
+    if len(likely) > 1:
         raise fault(name, f"holds clouds of {len(counts)} topics: {told}", 'choose one with topic="..."')
-    if asked is not None and asked not in counts:
-        raise fault(name, f"holds no clouds of the topic {asked!r}", f"it has {told}")
-    return next(iter(counts)) if asked is None else asked
+    return likely[0]
 
 
 class Recorded(NamedTuple):

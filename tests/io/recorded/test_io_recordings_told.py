@@ -13,6 +13,7 @@ import pytest
 from test_io_recorded import HUNDRED, cloud_message, custom_message, livox_store, write_bag
 
 import hybridreg as hr
+from hybridreg.cloud import PointCloud
 from hybridreg.io import read_points
 
 
@@ -168,3 +169,46 @@ def test_a_choice_that_chooses_nothing_is_refused(tmp_path: Path) -> None:
             done = CliRunner().invoke(app, [command, path, flat, *options])
             assert done.exit_code == 2, done.output
             assert word in done.stderr
+
+
+def scan_message(store: Any, ranges: list[float]) -> Any:
+    """A LaserScan of a beam every 90 degrees, from behind on."""
+    return store.types["sensor_msgs/msg/LaserScan"](
+        header=cloud_message(store, HUNDRED).header, angle_min=-np.pi, angle_max=np.pi, angle_increment=np.pi / 2,
+        time_increment=0.0, scan_time=0.1, range_min=0.5, range_max=30.0, ranges=np.array(ranges, np.float32),
+        intensities=np.zeros(0, np.float32),
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", ["ros1", "sqlite", "mcap"])
+def test_scans_of_2d_scanners_are_read_where_they_are_asked_for_or_alone(
+    kind: str, typesys: Any, tmp_path: Path
+) -> None:
+    store = livox_store(typesys, 1 if kind == "ros1" else 2)
+    scan = scan_message(store, [4.0, 3.0, 2.0, 1.0, 0.4, 31.0, np.inf, np.nan] * 10)
+    want = [[-4.0, 0.0, 0.0], [0.0, -3.0, 0.0], [2.0, 0.0, 0.0], [0.0, 1.0, 0.0]] * 10
+    ending = ".bag" if kind == "ros1" else ""
+    path = write_bag(tmp_path / f"alone{ending}", kind, {"/scan": [scan]}, store)
+    np.testing.assert_allclose(hr.read(path).points, want, atol=1e-4)
+    np.testing.assert_allclose(PointCloud.of(scan, nonfinite="drop").points, want, atol=1e-4)
+    topics = {"/scan": [scan], "/points": [cloud_message(store, HUNDRED)]}
+    path = write_bag(tmp_path / f"both{ending}", kind, topics, store)
+    np.testing.assert_array_equal(hr.read(path).points, HUNDRED)
+    np.testing.assert_allclose(hr.read(path, topic="/scan").points, want, atol=1e-4)
+
+
+def test_scans_and_clouds_of_the_older_kind(typesys: Any, tmp_path: Path) -> None:
+    store = livox_store(typesys, 2)
+    told = {"angle_min": 0.0, "angle_increment": np.pi / 2, "range_min": 0.0, "range_max": 0.0}
+    found = PointCloud.of({**told, "ranges": [1.0, 2.0, None, 3.0] * 10}, nonfinite="drop").points
+    np.testing.assert_allclose(found[:3], [[1.0, 0.0, 0.0], [0.0, 2.0, 0.0], [0.0, -3.0, 0.0]], atol=1e-9)
+    for wrong, word in (([[1.0, 2.0]], r"have the shape \(1, 2\)"), ([object()], "give the first echo")):
+        with pytest.raises(ValueError, match=word):
+            PointCloud.of({**told, "ranges": wrong})
+    point = store.types["geometry_msgs/msg/Point32"]
+    older = store.types["sensor_msgs/msg/PointCloud"](
+        header=cloud_message(store, HUNDRED).header, points=[point(x=x, y=y, z=z) for x, y, z in HUNDRED], channels=[]
+    )  # fmt: skip
+    path = write_bag(tmp_path / "a", "sqlite", {"/cloud": [older]}, store)
+    np.testing.assert_array_equal(read_points(path), HUNDRED)
+    np.testing.assert_array_equal(PointCloud.of(older).points, HUNDRED)
