@@ -44,8 +44,13 @@ def read(
     Raises
     ------
     FileNotFoundError, ValueError, ImportError
-        As `PointCloud.of`; a choice that the file does not offer, with those that it does.
+        As `PointCloud.of`; a choice that the file does not offer, with those that it does; no path.
     """
+    if not isinstance(path, (str, os.PathLike)):
+        held = type(path).__name__
+        raise ValueError(
+            f"path: is a {held}, no path of a file; give it to register or PointCloud.of as it is"
+        )
     select = Selection(topic=topic, index=index, at=at, accumulate=accumulate)
     return PointCloud.of(path, name=os.fspath(path), nonfinite=nonfinite, viewpoint=viewpoint, select=select)
 

@@ -190,7 +190,7 @@ def test_scans_of_2d_scanners_are_read_where_they_are_asked_for_or_alone(
     ending = ".bag" if kind == "ros1" else ""
     path = write_bag(tmp_path / f"alone{ending}", kind, {"/scan": [scan]}, store)
     np.testing.assert_allclose(hr.read(path).points, want, atol=1e-4)
-    np.testing.assert_allclose(PointCloud.of(scan, nonfinite="drop").points, want, atol=1e-4)
+    np.testing.assert_allclose(PointCloud.of(scan).points, want, atol=1e-4)
     topics = {"/scan": [scan], "/points": [cloud_message(store, HUNDRED)]}
     path = write_bag(tmp_path / f"both{ending}", kind, topics, store)
     np.testing.assert_array_equal(hr.read(path).points, HUNDRED)
@@ -200,7 +200,7 @@ def test_scans_of_2d_scanners_are_read_where_they_are_asked_for_or_alone(
 def test_scans_and_clouds_of_the_older_kind(typesys: Any, tmp_path: Path) -> None:
     store = livox_store(typesys, 2)
     told = {"angle_min": 0.0, "angle_increment": np.pi / 2, "range_min": 0.0, "range_max": 0.0}
-    found = PointCloud.of({**told, "ranges": [1.0, 2.0, None, 3.0] * 10}, nonfinite="drop").points
+    found = PointCloud.of({**told, "ranges": [1.0, 2.0, None, 3.0] * 10}).points
     np.testing.assert_allclose(found[:3], [[1.0, 0.0, 0.0], [0.0, 2.0, 0.0], [0.0, -3.0, 0.0]], atol=1e-9)
     for wrong, word in (([[1.0, 2.0]], r"have the shape \(1, 2\)"), ([object()], "give the first echo")):
         with pytest.raises(ValueError, match=word):
@@ -212,3 +212,16 @@ def test_scans_and_clouds_of_the_older_kind(typesys: Any, tmp_path: Path) -> Non
     path = write_bag(tmp_path / "a", "sqlite", {"/cloud": [older]}, store)
     np.testing.assert_array_equal(read_points(path), HUNDRED)
     np.testing.assert_array_equal(PointCloud.of(older).points, HUNDRED)
+
+
+def test_a_message_in_hand_is_the_one_in_a_bag(typesys: Any, tmp_path: Path) -> None:
+    store = livox_store(typesys, 2)
+    holed = np.where(np.arange(100)[:, None] % 3 == 0, np.nan, HUNDRED)
+    holed[1::5] = 0.0
+    message = cloud_message(store, holed)
+    path = write_bag(tmp_path / "a", "sqlite", {"/points": [message]}, store)
+    left = holed[np.isfinite(holed).all(axis=1) & holed.any(axis=1)]
+    np.testing.assert_array_equal(PointCloud.of(message).points, left)
+    np.testing.assert_array_equal(hr.read(path).points, left)
+    with pytest.raises(ValueError, match="is a .*PointCloud2, no path of a file; give it to register"):
+        hr.read(message)
