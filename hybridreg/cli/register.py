@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import os
+import warnings
 from enum import Enum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
@@ -64,6 +66,7 @@ def command(
     """Align two point clouds; print the pose, the verdict on it, and the seconds of each stage."""
     from hybridreg.changes import build
     from hybridreg.cloud import PointCloud
+    from hybridreg.io.point_files import choices_in
     from hybridreg.pair import Pair
 
     options.check_form(form)
@@ -76,6 +79,9 @@ def command(
         changes["prior"] = {**changes.get("prior", {}), **known}
     method = build(changes)
     select = options.selections((source, target), topic, index, at, accumulate)
+    if select[0] == select[1] and os.path.realpath(source) == os.path.realpath(target):
+        cure = "choose another one for each: --index 0,1" if choices_in(source) else "name two files"
+        warnings.warn(f"source and target are the same cloud of {source}; {cure}", UserWarning, stacklevel=1)
     missing: Literal["raise", "drop"] = "drop" if nonfinite is NonFinite.drop else "raise"
     clouds = [
         PointCloud.of(

@@ -23,7 +23,10 @@ def command(
     source: Annotated[Path, typer.Argument(help="The cloud that moves: ply, pcd, npy, las, e57, a bag ...")],
     target: Annotated[Path, typer.Argument(help="The cloud that stays.")],
     pose: Annotated[
-        Path | None, typer.Argument(help="A file of a 4x4 matrix, or a result.json; none: as they are.")
+        Path | None,
+        typer.Argument(
+            help="A file of a pose in any form of `register --format`, or a result.json; none: as they are."
+        ),
     ] = None,
     out: Annotated[
         Path | None, typer.Option(help="Write the page here, instead of opening it in the browser.")

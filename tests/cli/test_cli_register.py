@@ -228,3 +228,12 @@ def test_the_module_runs_as_a_command(clouds: tuple[str, str]) -> None:
     assert done.stdout == ""
     assert done.stderr.startswith("hybridreg: none.ply: ")
     assert done.stderr.count("\n") == 1
+
+
+@pytest.mark.usefixtures("verdict")
+def test_one_cloud_as_source_and_target_is_told(clouds: tuple[str, str]) -> None:
+    path = Path(clouds[0])
+    told = call("register", path, path.parent / ".." / path.parent.name / path.name, *SMALL).stderr
+    assert "source and target are the same cloud" in told
+    assert "name two files" in told
+    assert "the same cloud" not in call("register", *clouds, *SMALL).stderr
