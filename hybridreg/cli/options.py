@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import os
+from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -166,10 +168,16 @@ def both(text: str | None, option: str) -> tuple[str, str]:
     return source.strip(), target.strip()
 
 
-def check_cloud_file(path: Path | None) -> None:
-    """Refuse a file that no cloud is written to, before the work and not after it."""
-    if path is not None and path.suffix.lower() not in (".ply", ".pcd"):
+def check_cloud_file(path: Path | None, read: Iterable[str | Path] = ()) -> None:
+    """Refuse a file that no cloud is written to, or one of those that are `read`, before the work and not after it."""
+    if path is None:
+        return
+    if path.suffix.lower() not in (".ply", ".pcd"):
         raise ValueError(f"{path}: clouds are written as .ply or .pcd; choose such a name")
+    if os.path.realpath(path) in map(os.path.realpath, read):
+        raise ValueError(
+            f"{path}: is one of the clouds that are read, and would be lost; choose another name"
+        )
 
 
 def check_form(form: str) -> None:

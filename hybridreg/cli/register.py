@@ -71,7 +71,7 @@ def command(
 
     options.check_form(form)
     for path in (aligned, merged):
-        options.check_cloud_file(path)
+        options.check_cloud_file(path, (source, target))
     source_sensor, target_sensor = options.both(sensors, "--sensors")
     changes = options.changes_of(preset, pipeline, settings, voxel)
     known = options.prior(init, max_translation, max_rotation, gravity, crop, crop_source, scale)

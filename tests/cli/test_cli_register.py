@@ -18,6 +18,7 @@ from hybridreg import testing
 from hybridreg.cli.app import app
 from hybridreg.geometry import se3
 from hybridreg.geometry.fitness import Overlay
+from hybridreg.io import write_points
 from hybridreg.pipeline import Trace
 from hybridreg.result import RegistrationResult
 
@@ -237,3 +238,14 @@ def test_one_cloud_as_source_and_target_is_told(clouds: tuple[str, str]) -> None
     assert "source and target are the same cloud" in told
     assert "name two files" in told
     assert "the same cloud" not in call("register", *clouds, *SMALL).stderr
+
+
+@pytest.mark.parametrize("option", ["--aligned", "--merged"])
+def test_no_cloud_is_written_over_one_that_is_read(tmp_path: Path, option: str) -> None:
+    pair = testing.sample_pair()[0]
+    write_points(tmp_path / "a.ply", pair.source.points)
+    write_points(tmp_path / "b.ply", pair.target.points)
+    (tmp_path / "link.ply").symlink_to(tmp_path / "b.ply")
+    for name in ("a.ply", "b.ply", "link.ply"):
+        told = refused(call("register", tmp_path / "a.ply", tmp_path / "b.ply", option, tmp_path / name))
+        assert f"{name}: is one of the clouds that are read, and would be lost; choose another name" in told
