@@ -20,8 +20,27 @@ _AS_ROS = {1: 2, 2: 1, 3: 4, 4: 3, 5: 6, 6: 5, 7: 7, 8: 8}
 
 
 def of_json(data: bytes) -> Any:
-    """The message in a text of JSON, its `data` in base64 still."""
-    return json.loads(data, object_hook=lambda fields: SimpleNamespace(**fields))
+    """The message in a text of JSON, its `data` in base64 still; what was left out is zero, as in protobuf."""
+    told = json.loads(data)
+    pose = told.get("pose") or {}
+    return SimpleNamespace(
+        data=told.get("data", ""),
+        point_stride=told.get("point_stride", 0),
+        fields=[
+            SimpleNamespace(
+                name=f.get("name", ""), offset=int(f.get("offset", 0)), type=int(f.get("type", 0))
+            )
+            for f in told.get("fields", [])
+        ],
+        pose=SimpleNamespace(
+            position=_numbers(pose.get("position"), "xyz"),
+            orientation=_numbers(pose.get("orientation"), "xyzw"),
+        ),
+    )
+
+
+def _numbers(told: Any, names: str) -> SimpleNamespace:
+    return SimpleNamespace(**{each: float((told or {}).get(each, 0.0)) for each in names})
 
 
 def points(message: Any, name: str) -> Array:

@@ -82,9 +82,13 @@ def test_a_cloud_of_foxglove_in_json_is_that_in_protobuf(tmp_path: Path) -> None
         path = write_mcap(path, [json.dumps({**told, **wrong}).encode()], "foxglove.PointCloud", "json")
         with pytest.raises(ValueError, match=word):
             read_points(path)
-    path = write_mcap(path, [b"no json"], "foxglove.PointCloud", "json")
-    with pytest.raises(ValueError, match="cannot be read as an MCAP file"):
-        read_points(path)
+    bare = {key: value for key, value in told.items() if key != "pose"}
+    path = write_mcap(path, [json.dumps(bare).encode()], "foxglove.PointCloud", "json")
+    np.testing.assert_array_equal(read_points(path), HUNDRED)
+    for text in (b"no json", b"[]", b'{"fields": [3]}', b'{"pose": {"position": {"x": "far"}}}'):
+        path = write_mcap(path, [text], "foxglove.PointCloud", "json")
+        with pytest.raises(ValueError, match="cannot be read as an MCAP file"):
+            read_points(path)
 
 
 @pytest.mark.parametrize("mode", ["FILE", "MESSAGE"])
