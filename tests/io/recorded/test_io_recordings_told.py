@@ -11,8 +11,10 @@ from typing import Any
 import numpy as np
 import pytest
 from test_io_recorded import HUNDRED, cloud_message, custom_message, livox_store, write_bag
+from typer.testing import CliRunner
 
 import hybridreg as hr
+from hybridreg.cli.app import app
 from hybridreg.cloud import PointCloud
 from hybridreg.io import read_points
 
@@ -127,6 +129,14 @@ def test_what_is_wrong_with_a_bag_is_told_with_a_cure(typesys: Any, tmp_path: Pa
     with pytest.raises(ValueError, match="is empty; choose another index"):
         read_points(tmp_path / "d")
     np.testing.assert_array_equal(hr.read(tmp_path / "d", index=1).points, HUNDRED)
+    for command, cure in (
+        ("register", "choose another --index"),
+        ("together", "`hybridreg register --index`"),
+    ):
+        out = ["--out", str(tmp_path / "out")]
+        done = CliRunner().invoke(app, [command, str(tmp_path / "d"), str(path), *out])
+        assert done.exit_code == 2, done.output
+        assert cure in done.stderr
     (tmp_path / "d").rename(tmp_path / "d.bag")
     with pytest.raises(ValueError, match="the folder of a ROS 2 bag; rename it"):
         read_points(tmp_path / "d.bag")
@@ -142,10 +152,6 @@ def test_seconds_are_numbers_of_any_kind(at: Any) -> None:
 
 
 def test_a_choice_that_chooses_nothing_is_refused(tmp_path: Path) -> None:
-    from typer.testing import CliRunner
-
-    from hybridreg.cli.app import app
-
     pye57 = pytest.importorskip("pye57")
     path, flat = str(tmp_path / "a.e57"), str(tmp_path / "a.npy")
     np.save(flat, HUNDRED)
@@ -169,6 +175,8 @@ def test_a_choice_that_chooses_nothing_is_refused(tmp_path: Path) -> None:
             (("--topic", "/p"), "--topic /p: chooses nothing in"),
             (("--index", "x"), "--index x: give one whole number"),
             (("--accumulate", "9"), "holds 3 scans"),
+            (("--accumulate", "0"), "--accumulate 0 must be"),
+            (("--index", "-9"), "choose from 0 to 2"),
         ):
             done = CliRunner().invoke(app, [command, path, flat, *options])
             assert done.exit_code == 2, done.output
