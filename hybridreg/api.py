@@ -79,7 +79,7 @@ def register(
     ----------
     source, target : path, array, table, tensor or object that holds points (`PointCloud.of`), in any mix
         Metres. The source moves, the target stays.
-    image : path, (H, W[, C]) array or None
+    image : path, (H, W[, C]) array, tensor, image of Pillow, sensor_msgs/Image, or None
         A camera image of the common view; no calibration. Stages that use no image ignore it.
     voxel : float or None
         Metres; None derives it from the clouds' extents.

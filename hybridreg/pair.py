@@ -97,7 +97,7 @@ class Pair:
         target_viewpoint: Given = "auto",
         gravity: Gravity = "known",
     ) -> Pair:
-        """Build a pair from anything `PointCloud.of` takes, and a path or an array for the image."""
+        """Build a pair from anything `PointCloud.of` takes, and a path or what `hybridreg.io.as_image` takes."""
         if gravity not in ("known", "unknown"):
             raise ValueError(f'gravity={gravity!r} must be "known" or "unknown"')
         return cls(
