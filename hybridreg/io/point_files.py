@@ -50,6 +50,7 @@ _ELSEWHERE = {
     ".active": "its recording was cut off: run `rosbag reindex` on it, and rename it to end in .bag",
     ".zstd": "of a ROS 2 bag give the folder, unpack anything else first",
     ".yaml": "of a ROS 2 bag give the folder",
+    **dict.fromkeys((".gz", ".bz2", ".xz", ".zip", ".7z", ".tar", ".tgz"), "unpack it first"),
 }
 
 Parser = Callable[[bytes, str], NDArray[np.float64]]

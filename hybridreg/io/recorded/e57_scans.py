@@ -93,6 +93,7 @@ def _rotation(quaternion: Array, name: str) -> Array:
 
     length = float(np.linalg.norm(quaternion))
     if not 0.5 < length < 2.0:
-        raise fault(name, f"a scan's rotation is the quaternion {quaternion.tolist()}, no rotation")
+        problem = f"a scan's rotation is the quaternion {quaternion.tolist()}, no rotation"
+        raise fault(name, problem, "export it with the poses of its scans, or without any")
     rotation: Array = Rotation.from_quat(np.roll(quaternion, -1)).as_matrix()  # w stands last there
     return rotation
