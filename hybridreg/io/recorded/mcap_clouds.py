@@ -64,7 +64,7 @@ def read_mcap(path: Path, selection: Selection) -> Recorded:
     make = load("mcap.reader", f"{name}: an MCAP file").make_reader
     with path.open("rb") as file:
         with foreign_parser(name, "an MCAP file", RECOVER):
-            reader = make(file)
+            reader = make(file, validate_crcs=True)
             summary = reader.get_summary()
         counts, flat, others = _topics(summary, name)
         topic = chosen_topic(counts, selection.topic, others, name, _CURE, flat)

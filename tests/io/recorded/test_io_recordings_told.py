@@ -61,6 +61,28 @@ def test_messages_of_ros_in_an_mcap_file_of_no_profile_of_ros_2(
         read_points(path)
 
 
+def test_a_byte_that_changed_is_told_by_the_checksum(typesys: Any, tmp_path: Path) -> None:
+    store = livox_store(typesys, 2)
+    message = cloud_message(store, HUNDRED)
+    mcap = pytest.importorskip("mcap.writer")
+    path = tmp_path / "a.mcap"
+    with path.open("wb") as file:
+        out = mcap.Writer(file, compression=mcap.CompressionType.NONE)
+        out.start(profile="", library="a test")
+        channel = out.register_channel(
+            "/p", "cdr", out.register_schema("sensor_msgs/msg/PointCloud2", "", b"")
+        )
+        out.add_message(channel, 1, bytes(store.serialize_cdr(message, message.__msgtype__)), 1)
+        out.finish()
+    np.testing.assert_array_equal(read_points(path), HUNDRED)
+    data = bytearray(path.read_bytes())
+    place = data.index(HUNDRED[50].astype("<f4").tobytes())
+    data[place + 3] ^= 1
+    path.write_bytes(data)
+    with pytest.raises(ValueError, match="a.mcap: cannot be read as an MCAP file"):
+        read_points(path)
+
+
 def test_a_cloud_of_foxglove_in_json_is_that_in_protobuf(tmp_path: Path) -> None:
     told = {
         "frame_id": "lidar",
