@@ -44,7 +44,8 @@ Accumulate = Annotated[str | None, typer.Option(metavar="N[,N]", help="So many m
 Format = Annotated[
     str,
     typer.Option(
-        "--format", help="The printed pose: matrix, quaternion, ros-tf, urdf, cloudcompare, kitti, tum."
+        "--format",
+        help="Form of poses, printed and in --out: matrix, quaternion, ros-tf, urdf, cloudcompare, kitti, tum.",
     ),
 ]
 Viewpoint = Annotated[

@@ -101,9 +101,16 @@ def command(
     write_clouds(clouds, result, aligned, merged)
     if out is not None:
         from hybridreg.eval.report import single_report
+        from hybridreg.io import write_text
+        from hybridreg.output.pose_text import FORMATS
 
         origin = single_report.Origin(str(source), str(target), source_sensor, target_sensor, typed(context))
         files = single_report.write(pair, result, out, origin)
+        for other in FORMATS:  # of an earlier run
+            (out / f"pose.{other}.txt").unlink(missing_ok=True)
+        if form != "matrix":  # which the report's folder has anyway
+            files = [*files, out / f"pose.{form}.txt"]
+            write_text(files[-1], result.format(form) + "\n")
         print(f"written to {out}: {', '.join(file.name for file in files)}")
     if result.verdict == "failed":
         raise typer.Exit(VERDICT_FAILED)
