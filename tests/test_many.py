@@ -160,6 +160,7 @@ def test_a_list_names_pairs_and_workers_change_nothing(town: Any, folder: Path) 
     ("source,target,id\na.ply,b.ply,x\nc.ply,b.ply,x\n", "two pairs are called 'x'"),
     ("source;target;id\na,1.ply;b.ply;x\nc.ply;b.ply;x\n", "two pairs are called 'x'"),
     ("source\ttarget\na.ply\t\n", "row 2 names no target"),
+    ("source,target\na,1.ply,b.ply\n", "row 2 has more cells than the first row has columns"),
     ("x,y,z\n1,2,3\n", "if it is a cloud and no list of pairs, name it by a pattern"),
 ])  # fmt: skip
 def test_a_list_that_is_none_tells_its_row(tmp_path: Path, content: str, word: str) -> None:
@@ -168,6 +169,15 @@ def test_a_list_that_is_none_tells_its_row(tmp_path: Path, content: str, word: s
     assert done.exit_code == 2
     assert word in done.stderr
     assert not (tmp_path / "out").exists()
+
+
+def test_columns_that_a_list_does_not_have_are_told(tmp_path: Path) -> None:
+    (tmp_path / "list.csv").write_text("Source, target,ID,init,image,\na.ply,b.ply,one,start.txt,a.jpg,,,\n")
+    with pytest.warns(
+        UserWarning, match="list.csv: init, image: not read; a list gives source, target and id"
+    ):
+        jobs = jobs_of([str(tmp_path / "list.csv")], None)
+    assert [(job.id, job.source) for job in jobs] == [("one", str(tmp_path / "a.ply"))]
 
 
 def test_a_pattern_that_fits_nothing_and_one_without_a_target(tmp_path: Path) -> None:

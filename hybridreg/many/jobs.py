@@ -5,7 +5,8 @@ from __future__ import annotations
 
 import csv
 import os
-from collections.abc import Sequence
+import warnings
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -88,13 +89,13 @@ def _listed(path: Path, target: str | os.PathLike[str] | None) -> list[Job]:
         rows = list(csv.DictReader(lines, delimiter=delimiter))
     except (UnicodeDecodeError, csv.Error) as error:
         raise fault(str(path), f"is no table ({error})", "save it as CSV in UTF-8") from error
+    _warn_of_columns(rows, path)
     jobs = []
     for number, row in enumerate(rows, start=2):
-        cells = {
-            (key or "").strip().lower(): (value or "").strip()
-            for key, value in row.items()
-            if isinstance(value, str)
-        }
+        if any(row.pop(None, ())):  # where DictReader keeps what has no column
+            cure = "put a name that holds the separator in quotes"
+            raise fault(str(path), f"row {number} has more cells than the first row has columns", cure)
+        cells = {(key or "").strip().lower(): (value or "").strip() for key, value in row.items()}
         source, own = cells.get("source", ""), cells.get("target", "")
         if not source or not (own or target):
             lacking = "source" if not source else "target"
@@ -114,3 +115,12 @@ def _listed(path: Path, target: str | os.PathLike[str] | None) -> list[Job]:
     if not jobs:
         raise fault(str(path), "holds no rows", "give one pair a row, below the columns source and target")
     return jobs
+
+
+def _warn_of_columns(rows: Sequence[Mapping[str, object]], path: Path) -> None:
+    names = [key for key in (rows[0] if rows else ()) if key]
+    useless = [key.strip() for key in names if key.strip().lower() not in Job._fields]
+    # A list without a source is told as what it is.
+    if useless and len(useless) < len(names):
+        words = f"{path}: {', '.join(useless)}: not read; a list gives source, target and id of each pair, and no more"
+        warnings.warn(words, UserWarning, stacklevel=4)
