@@ -6,6 +6,7 @@ from __future__ import annotations
 import json
 import re
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -379,6 +380,12 @@ def test_text_that_is_no_pose_is_refused_with_what_is_expected(tmp_path: Path, t
     (tmp_path / "pose.txt").write_text(text)
     with pytest.raises(ValueError, match=re.escape(words)):
         read_pose(tmp_path / "pose.txt")
+
+
+@pytest.mark.parametrize("held", ["transformation", "T_target_source"])
+def test_a_result_in_place_of_its_pose_is_told(held: str) -> None:
+    with pytest.raises(ValueError, match=f"init: expected numbers .*; give its {held}"):
+        Prior(init=SimpleNamespace(**{held: TURNED}))
 
 
 @pytest.mark.parametrize("quoted", [False, True])

@@ -4,6 +4,7 @@ imports."""
 
 from __future__ import annotations
 
+import io
 from collections.abc import Mapping
 from typing import Any, NoReturn
 
@@ -209,7 +210,10 @@ def _has_no_faces(x: Any) -> bool:
 
 def _as_array(x: Any, name: str) -> NDArray[Any]:
     if isinstance(x, (bytes, bytearray)):
-        _refuse(x, name, "bytes have no type; pass numpy.frombuffer(x, dtype).reshape(-1, 3)")
+        cure = "bytes have no type; of a file pass the path, of numbers numpy.frombuffer(x, dtype).reshape(-1, 3)"
+        _refuse(x, name, cure)
+    if isinstance(x, io.IOBase):
+        _refuse(x, name, "pass the path of the file")
     array = np.ma.asarray(x) if np.ma.isMaskedArray(x) else np.asarray(x)
     if isinstance(x, (list, tuple)) and any(np.ma.isMaskedArray(each) for each in x):
         # numpy leaves the masks out

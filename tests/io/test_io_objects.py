@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import base64
 import contextlib
+import io
 from collections import namedtuple
 from types import SimpleNamespace
 from typing import Any
@@ -534,6 +535,7 @@ def test_a_scene_of_clouds_alone() -> None:
         (P[:, :2], "three coordinates"),
         (np.c_[P, P, P, P].T, "x[:3].T"),
         (b"abc", "frombuffer"),
+        (io.BytesIO(b"ply"), "pass the path of the file"),
         (zip(*P.T, strict=True), "column_stack"),
         (object(), "column_stack"),
         (lambda: P, "column_stack"),
