@@ -44,8 +44,13 @@ def read(
     Raises
     ------
     FileNotFoundError, ValueError, ImportError
-        As `PointCloud.of`; a choice that the file does not offer, with those that it does.
+        As `PointCloud.of`; a choice that the file does not offer, with those that it does; no path.
     """
+    if not isinstance(path, (str, os.PathLike)):
+        held = type(path).__name__
+        raise ValueError(
+            f"path: is a {held}, no path of a file; give it to register or PointCloud.of as it is"
+        )
     select = Selection(topic=topic, index=index, at=at, accumulate=accumulate)
     return PointCloud.of(path, name=os.fspath(path), nonfinite=nonfinite, viewpoint=viewpoint, select=select)
 
@@ -74,7 +79,7 @@ def register(
     ----------
     source, target : path, array, table, tensor or object that holds points (`PointCloud.of`), in any mix
         Metres. The source moves, the target stays.
-    image : path, (H, W[, C]) array or None
+    image : path, (H, W[, C]) array, tensor, image of Pillow, sensor_msgs/Image, or None
         A camera image of the common view; no calibration. Stages that use no image ignore it.
     voxel : float or None
         Metres; None derives it from the clouds' extents.

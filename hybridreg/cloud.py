@@ -17,6 +17,7 @@ from hybridreg.geometry import extent
 from hybridreg.geometry.range_image import RangeImage, RangeImages
 from hybridreg.geometry.viewpoint import Given, Seen, found, given
 from hybridreg.io import read_recorded, read_viewpoint
+from hybridreg.io.recorded import ros_messages
 from hybridreg.io.recorded.recording import ANY, Recorded, Selection
 
 Array = NDArray[np.float64]
@@ -75,14 +76,15 @@ class PointCloud:
         ----------
         x : path, array, table or object that holds points
             Arrays and tensors (N, 3+), (3 to 6, N) or (H, W, 3+); records, tables and dictionaries with x, y and z by
-            name; ROS's PointCloud2, clouds of laspy and Open3D, and whatever else has `points`
+            name; ROS's PointCloud2 and LaserScan, clouds of laspy and Open3D, and whatever else has `points`
             (`hybridreg.io.point_objects`). Metres, unless a name gives another unit, as in `X (mm)`. Masked or missing
             values count as not finite.
         name : str
             What error messages call the cloud.
         nonfinite : "raise" or "drop"
-            What to do with points that are not finite. "drop" also drops points exactly at the origin, which drivers
-            write for missing returns, where they are 1 % of the points or more; "raise" warns of them.
+            What to do with points that are not finite; in ROS's messages and bags they are missing returns, and always
+            dropped. "drop" also drops points exactly at the origin, which drivers write for missing returns, where they
+            are 1 % of the points or more; "raise" warns of them.
         viewpoint : "auto", "none", (3,), (N, 3), or ((k, 3), (N,))
             Where the sensor stood, in the coordinates of the points: one place, one for each point, or places and the
             row of each point's. "none" is right for a map, a CAD model or a merged cloud whose viewpoints are unknown:
@@ -106,7 +108,8 @@ class PointCloud:
             recorded = read_recorded(x, select)
             place = recorded.guess if recorded.guess is not None else read_viewpoint(x)
         raw = recorded.points if isinstance(x, (str, os.PathLike)) else gate.coordinates(x, name)
-        drop = nonfinite == "drop" or recorded.holed
+        # A scan of ROS has its missing returns in it, in a bag or in hand.
+        drop = nonfinite == "drop" or recorded.holed or ros_messages.is_cloud(x)
         kept, rows = gate.finite(raw, name, drop=drop)
         kept, rows = gate.returned(kept, rows, name, drop=drop)
         gate.rounded(kept, name)

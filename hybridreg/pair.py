@@ -97,7 +97,7 @@ class Pair:
         target_viewpoint: Given = "auto",
         gravity: Gravity = "known",
     ) -> Pair:
-        """Build a pair from anything `PointCloud.of` takes, and a path or an array for the image."""
+        """Build a pair from anything `PointCloud.of` takes, and a path or what `hybridreg.io.as_image` takes."""
         if gravity not in ("known", "unknown"):
             raise ValueError(f'gravity={gravity!r} must be "known" or "unknown"')
         return cls(
@@ -133,14 +133,22 @@ class LabelledPair:
 
 def _image(image: Any) -> Any:
     from hybridreg.io import as_image, check_image
+    from hybridreg.io.meaning.image_objects import pixels_in
 
     if not isinstance(image, (str, os.PathLike)):
-        shape = np.shape(image)
+        pixels = pixels_in(image, "image")
+        shape = pixels.shape
         if not shape:
-            raise ValueError(f"image: is a {type(image).__name__}, no array and no path; {_ELSEWHERE}")
+            raise ValueError(f"image: is a {type(image).__name__}, no array and no path; {_elsewhere(image)}")
         if len(shape) == 2 and 0 < min(shape) < _FEWEST_PIXELS:
             size = " x ".join(map(str, shape))
             raise ValueError(f"image: an array of {size} is no camera image; {_ELSEWHERE}")
-        return as_image(image)
+        return as_image(pixels)
     check_image(image)
     return Path(image)
+
+
+def _elsewhere(image: Any) -> str:
+    # What may be an encoded image: bytes, an open file, a sensor_msgs/CompressedImage.
+    encoded = isinstance(image, (bytes, bytearray)) or hasattr(image, "read") or hasattr(image, "format")
+    return "write its bytes to a file, and give the path" if encoded else _ELSEWHERE

@@ -19,6 +19,7 @@ from hybridreg.data.hard import box_world
 from hybridreg.geometry import se3
 from hybridreg.geometry.voxel_cells import voxel_centroids
 from hybridreg.io import write_points
+from hybridreg.many.jobs import jobs_of
 
 
 @pytest.fixture(scope="module")
@@ -157,6 +158,10 @@ def test_a_list_names_pairs_and_workers_change_nothing(town: Any, folder: Path) 
     ("target\nb.ply\n", "row 2 names no source"),
     ("source,target\n", "holds no rows"),
     ("source,target,id\na.ply,b.ply,x\nc.ply,b.ply,x\n", "two pairs are called 'x'"),
+    ("source;target;id\na,1.ply;b.ply;x\nc.ply;b.ply;x\n", "two pairs are called 'x'"),
+    ("source\ttarget\na.ply\t\n", "row 2 names no target"),
+    ("source,target\na,1.ply,b.ply\n", "row 2 has more cells than the first row has columns"),
+    ("x,y,z\n1,2,3\n", "if it is a cloud and no list of pairs, name it by a pattern"),
 ])  # fmt: skip
 def test_a_list_that_is_none_tells_its_row(tmp_path: Path, content: str, word: str) -> None:
     (tmp_path / "list.csv").write_text(content)
@@ -166,13 +171,43 @@ def test_a_list_that_is_none_tells_its_row(tmp_path: Path, content: str, word: s
     assert not (tmp_path / "out").exists()
 
 
+def test_columns_that_a_list_does_not_have_are_told(tmp_path: Path) -> None:
+    (tmp_path / "list.csv").write_text("Source, target,ID,init,image,\na.ply,b.ply,one,start.txt,a.jpg,,,\n")
+    with pytest.warns(
+        UserWarning, match="list.csv: init, image: not read; a list gives source, target and id"
+    ):
+        jobs = jobs_of([str(tmp_path / "list.csv")], None)
+    assert [(job.id, job.source) for job in jobs] == [("one", str(tmp_path / "a.ply"))]
+
+
 def test_a_pattern_that_fits_nothing_and_one_without_a_target(tmp_path: Path) -> None:
     (tmp_path / "a.ply").write_bytes(b"")
     for arguments, word in (
         (["nowhere/*.ply"], "no file fits"), ([str(tmp_path / "*.ply")], "--target"),
         ([str(tmp_path / "*.ply"), "--target", str(tmp_path / "a.ply")], "fits the target alone"),
-        (["gone.csv"], "no such list"),
+        (["gone.csv"], "no such list"), ([str(tmp_path / "*.csv")], "no file fits this pattern"),
+        ([str(tmp_path / "a.ply"), "--target", "gone.las"], "gone.las: no such target"),
+        ([str(tmp_path), "--target", str(tmp_path / "a.ply")], "is a folder; give a pattern of its files"),
+        (["pairs.json"], "save a list of pairs as .csv"),
     ):  # fmt: skip
         done = CliRunner().invoke(app, ["batch", *arguments, "--out", str(tmp_path / "out")])
         assert done.exit_code == 2
         assert word in done.stderr
+    (tmp_path / "out").write_text("")
+    arguments = [str(tmp_path / "*.ply"), "--target", str(Path(__file__))]
+    done = CliRunner().invoke(app, ["batch", *arguments, "--out", str(tmp_path / "out")])
+    assert done.exit_code == 2
+    assert "a file of this name is in the way" in done.stderr
+
+
+def test_clouds_of_a_batch_are_named_one_by_one_or_by_patterns(tmp_path: Path) -> None:
+    for name in ("s10.csv", "s9.csv", "s[1].csv", "map.ply"):
+        (tmp_path / name).write_bytes(b"")
+    (tmp_path / "s folder").mkdir()
+    (tmp_path / "s.bag").mkdir()
+    (tmp_path / "s.bag" / "metadata.yaml").write_text("")
+    pattern, target = str(tmp_path / "s*"), tmp_path / "map.ply"
+    assert [job.id for job in jobs_of([pattern], target)] == ["s9", "s10", "s", "s[1]"]
+    assert [job.id for job in jobs_of([pattern + ".csv"], target)] == ["s9", "s10", "s[1]"]
+    named = [str(tmp_path / "s[1].csv"), str(tmp_path / "s10.csv")]
+    assert [job.source for job in jobs_of(named, target)] == named

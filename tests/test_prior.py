@@ -6,6 +6,7 @@ from __future__ import annotations
 import json
 import re
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -20,7 +21,7 @@ from hybridreg.geometry import se3
 from hybridreg.io import write_matrix, write_points
 from hybridreg.io.poses.pose_file import read_pose
 from hybridreg.output.pose_files import pose_files
-from hybridreg.output.pose_text import FORMATS, pose_text
+from hybridreg.output.pose_text import FORMATS, pose_text, quaternion, roll_pitch_yaw
 from hybridreg.prior.prior import Prior
 
 DEMO = Path(hr.__file__).parent / "data" / "demo"
@@ -364,7 +365,13 @@ def test_a_matrix_of_numpy_or_json_is_read(tmp_path: Path) -> None:
         ("1 2 3 0 0 14", "holds 6 numbers; write a pose as four lines"),
         ("1 2 3 0 0 0 9", "have the length 9, a quaternion has 1"),
         ("1 0 0\n0 1 0\n0 0 1\n5 6 7", "holds four rows of three numbers; transpose it"),
-        ("static_transform_publisher --x 1 --yaw 2", "has no --y, --z, --qx"),
+        ("static_transform_publisher --x 1 --yaw 2 --qw 1", "has a quaternion and --yaw; keep one of them"),
+        ("static_transform_publisher --x 1 --qz 1", "have the length 1.414, a quaternion has 1"),
+        ("static_transform_publisher --x one", "holds 'one' where a number of a pose is needed"),
+        (
+            "static_transform_publisher 1 2 3 map lidar",
+            "no 6 or 7 numbers in a row; write a pose as four lines",
+        ),
         ('<origin xyz="1 2"/>', "its xyz holds 2 numbers"),
         ("PK\x03\x04\x00", "is a zip archive, not a pose"),
     ],
@@ -373,6 +380,49 @@ def test_text_that_is_no_pose_is_refused_with_what_is_expected(tmp_path: Path, t
     (tmp_path / "pose.txt").write_text(text)
     with pytest.raises(ValueError, match=re.escape(words)):
         read_pose(tmp_path / "pose.txt")
+
+
+@pytest.mark.parametrize("held", ["transformation", "T_target_source"])
+def test_a_result_in_place_of_its_pose_is_told(held: str) -> None:
+    with pytest.raises(ValueError, match=f"init: expected numbers .*; give its {held}"):
+        Prior(init=SimpleNamespace(**{held: TURNED}))
+
+
+@pytest.mark.parametrize("quoted", [False, True])
+@pytest.mark.parametrize("angles", [False, True])
+@pytest.mark.parametrize("named", [False, True])
+def test_every_way_to_publish_a_pose_in_ros_is_read(
+    tmp_path: Path, named: bool, angles: bool, quoted: bool
+) -> None:
+    roll, pitch, yaw = roll_pitch_yaw(TURNED[:3, :3])
+    x, y, z = TURNED[:3, 3]
+    turn = [yaw, pitch, roll] if angles else list(quaternion(TURNED[:3, :3]))
+    names = ["x", "y", "z", *(("yaw", "pitch", "roll") if angles else ("qx", "qy", "qz", "qw"))]
+    values = [repr(float(value)) for value in (x, y, z, *turn)]
+    words = [word for pair in zip((f"--{each}" for each in names), values, strict=True) for word in pair]
+    words = [*words, "--frame-id", "map"] if named else [*values, "map", "lidar_2", "100"]
+    text = f"rosrun tf static_transform_publisher {' '.join(words)}\n"
+    if quoted:  # as launch files have it, in Python and in XML
+        args = str(words) if named else f'"{" ".join(words)}"'
+        text = f"Node(executable='static_transform_publisher', arguments={args})"
+    (tmp_path / "pose.txt").write_text(text)
+    np.testing.assert_allclose(read_pose(tmp_path / "pose.txt"), TURNED, rtol=0, atol=1e-14)
+    (tmp_path / "pose.txt").write_text(text + text)
+    with pytest.raises(ValueError, match="holds 2 poses; keep the one from the source to the target"):
+        read_pose(tmp_path / "pose.txt")
+
+
+def test_what_a_published_pose_leaves_out_is_nought(tmp_path: Path) -> None:
+    (tmp_path / "pose.txt").write_text("static_transform_publisher --z=1.5 --frame-id a --child-frame-id b")
+    np.testing.assert_array_equal(read_pose(tmp_path / "pose.txt"), se3.from_rt(np.eye(3), [0.0, 0.0, 1.5]))
+
+
+def test_a_pose_of_the_other_direction_is_not_to_be_renamed(tmp_path: Path) -> None:
+    (tmp_path / "p.json").write_text(json.dumps({"T_source_target": TURNED.tolist()}))
+    with pytest.raises(
+        ValueError, match="its T_source_target maps target points to source points; invert it"
+    ):
+        read_pose(tmp_path / "p.json")
 
 
 def test_json_without_a_pose_is_refused_by_its_entries(tmp_path: Path) -> None:

@@ -145,6 +145,7 @@ def test_what_cannot_be_is_refused(tmp_path: Path) -> None:
     for arguments, word in (
         ([a], "one cloud, two or more"), ([str(tmp_path / "*.las")], "no file fits"), ([a, b, a], "a.ply: named twice"),
         ([a, b, "--format", "euler"], "--format euler"), ([a, b, "--merged", "x.obj"], "x.obj"),
+        ([a, b, "--merged", b], "b.ply: is one of the clouds that are read"),
         ([a, b, "--reference", "c"], "reference 'c': is none of the clouds; they are a, b"),
         ([a, b, "--viewpoint", "1,2"], "--viewpoint 1,2"),
     ):  # fmt: skip

@@ -20,7 +20,10 @@ from hybridreg.config.number_of import number_of
 @plainly
 def command(
     what: Annotated[
-        str, typer.Argument(help="A CSV list (source,target,id), or a pattern such as 'scans/*.pcd'.")
+        list[str],
+        typer.Argument(
+            help="A CSV list (source,target,id), or clouds: paths, or a pattern such as 'scans/*.pcd'."
+        ),
     ],
     out: Annotated[Path, typer.Option(help="Folder for rows.jsonl and poses.csv.")],
     target: Annotated[Path | None, typer.Option(help="The target of all that name none; read once.")] = None,

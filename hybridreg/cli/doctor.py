@@ -27,6 +27,7 @@ _NEEDED = {
     "lightning_fabric": ("lightning-fabric", "training (extra `train`)"),
     "laspy": ("laspy", "las and laz files (extra `las`)"),
     "rosbags": ("rosbags", "bags (extra `ros`)"),
+    "mcap": ("mcap", "MCAP files of other tools than ROS 2 (extra `ros`)"),
     "pye57": ("pye57", "e57 files (extra `e57`)"),
     "pyarrow": ("pyarrow", "feather and parquet files (extra `arrow`)"),
     "trimesh": ("trimesh", "obj, stl, off and glb files (extra `mesh`)"),

@@ -3,10 +3,15 @@
 
 from __future__ import annotations
 
+import os
+from collections.abc import Iterable
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+
+if TYPE_CHECKING:
+    from hybridreg.io.recorded.recording import Selection
 
 Preset = Annotated[str | None, typer.Option(help="Pipeline by name; see `hybridreg list presets`.")]
 PipelineFile = Annotated[Path | None, typer.Option(help="Pipeline as a TOML file, instead of a preset.")]
@@ -39,7 +44,8 @@ Accumulate = Annotated[str | None, typer.Option(metavar="N[,N]", help="So many m
 Format = Annotated[
     str,
     typer.Option(
-        "--format", help="The printed pose: matrix, quaternion, ros-tf, urdf, cloudcompare, kitti, tum."
+        "--format",
+        help="Form of poses, printed and in --out: matrix, quaternion, ros-tf, urdf, cloudcompare, kitti, tum.",
     ),
 ]
 Viewpoint = Annotated[
@@ -112,15 +118,25 @@ def _numbers(text: str, option: str, counts: tuple[int, ...], words: str) -> tup
 
 
 def selections(
-    topic: str | None, index: str | None, at: str | None, accumulate: str | None
-) -> list[dict[str, Any]]:
-    """What `hybridreg.read` takes, for the source and for the target."""
+    paths: tuple[Path, Path], topic: str | None, index: str | None, at: str | None, accumulate: str | None
+) -> list[Selection]:
+    """Which cloud of the source's file and which of the target's, each by those options that its kind of file has.
+
+    Raises
+    ------
+    ValueError
+        A value that is none, or an option that concerns neither file.
+    """
+    from hybridreg.io.point_files import choices_in
+    from hybridreg.io.recorded.recording import Selection
+
     told: list[dict[str, Any]] = [{}, {}]
-    for name, text, kind in (
-        ("topic", topic, str),
-        ("index", index, int),
-        ("at", at, float),
-        ("accumulate", accumulate, int),
+    known = [choices_in(path) for path in paths]
+    for name, text, kind, words in (
+        ("topic", topic, str, "name"),
+        ("index", index, int, "whole number"),
+        ("at", at, float, "number of seconds"),
+        ("accumulate", accumulate, int, "whole number"),
     ):
         if text is None:
             continue
@@ -131,12 +147,14 @@ def selections(
             values = []
         if len(values) not in (1, 2):
             raise ValueError(
-                f"--{name} {text}: give one for both clouds, or the source's and the target's with a comma"
+                f"--{name} {text}: give one {words} for both clouds, or the source's and the target's with a comma"
             )
-        for side, value in zip(told, values * (2 // len(values)), strict=True):
-            if value != "":
+        if not any(name in each for each in known):
+            raise ValueError(f"--{name} {text}: chooses nothing in {paths[0]} and {paths[1]}; leave it out")
+        for side, its, value in zip(told, known, values * (2 // len(values)), strict=True):
+            if value != "" and name in its:
                 side[name] = value
-    return told
+    return [Selection(**each) for each in told]
 
 
 def both(text: str | None, option: str) -> tuple[str, str]:
@@ -151,10 +169,16 @@ def both(text: str | None, option: str) -> tuple[str, str]:
     return source.strip(), target.strip()
 
 
-def check_cloud_file(path: Path | None) -> None:
-    """Refuse a file that no cloud is written to, before the work and not after it."""
-    if path is not None and path.suffix.lower() not in (".ply", ".pcd"):
+def check_cloud_file(path: Path | None, read: Iterable[str | Path] = ()) -> None:
+    """Refuse a file that no cloud is written to, or one of those that are `read`, before the work and not after it."""
+    if path is None:
+        return
+    if path.suffix.lower() not in (".ply", ".pcd"):
         raise ValueError(f"{path}: clouds are written as .ply or .pcd; choose such a name")
+    if os.path.realpath(path) in map(os.path.realpath, read):
+        raise ValueError(
+            f"{path}: is one of the clouds that are read, and would be lost; choose another name"
+        )
 
 
 def check_form(form: str) -> None:

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import os
+import warnings
 from enum import Enum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
@@ -64,19 +66,22 @@ def command(
     """Align two point clouds; print the pose, the verdict on it, and the seconds of each stage."""
     from hybridreg.changes import build
     from hybridreg.cloud import PointCloud
-    from hybridreg.io.point_files import selection_for
+    from hybridreg.io.point_files import choices_in
     from hybridreg.pair import Pair
 
     options.check_form(form)
     for path in (aligned, merged):
-        options.check_cloud_file(path)
+        options.check_cloud_file(path, (source, target))
     source_sensor, target_sensor = options.both(sensors, "--sensors")
     changes = options.changes_of(preset, pipeline, settings, voxel)
     known = options.prior(init, max_translation, max_rotation, gravity, crop, crop_source, scale)
     if known:
         changes["prior"] = {**changes.get("prior", {}), **known}
     method = build(changes)
-    select = options.selections(topic, index, at, accumulate)
+    select = options.selections((source, target), topic, index, at, accumulate)
+    if select[0] == select[1] and os.path.realpath(source) == os.path.realpath(target):
+        cure = "choose another one for each: --index 0,1" if choices_in(source) else "name two files"
+        warnings.warn(f"source and target are the same cloud of {source}; {cure}", UserWarning, stacklevel=1)
     missing: Literal["raise", "drop"] = "drop" if nonfinite is NonFinite.drop else "raise"
     clouds = [
         PointCloud.of(
@@ -84,7 +89,7 @@ def command(
             name=name,
             nonfinite=missing,
             viewpoint=options.viewpoint(place, f"--{name}-viewpoint"),
-            select=selection_for(path, choice),
+            select=choice,
         )
         for name, path, place, choice in zip(
             ("source", "target"), (source, target), (source_viewpoint, target_viewpoint), select, strict=True
@@ -96,9 +101,16 @@ def command(
     write_clouds(clouds, result, aligned, merged)
     if out is not None:
         from hybridreg.eval.report import single_report
+        from hybridreg.io import write_text
+        from hybridreg.output.pose_text import FORMATS
 
         origin = single_report.Origin(str(source), str(target), source_sensor, target_sensor, typed(context))
         files = single_report.write(pair, result, out, origin)
+        for other in FORMATS:  # of an earlier run
+            (out / f"pose.{other}.txt").unlink(missing_ok=True)
+        if form != "matrix":  # which the report's folder has anyway
+            files = [*files, out / f"pose.{form}.txt"]
+            write_text(files[-1], result.format(form) + "\n")
         print(f"written to {out}: {', '.join(file.name for file in files)}")
     if result.verdict == "failed":
         raise typer.Exit(VERDICT_FAILED)

@@ -46,8 +46,8 @@ def command(
     from hybridreg.many.together_run import files_of, run
 
     options.check_form(form)
-    options.check_cloud_file(merged)
     files = files_of(what)
+    options.check_cloud_file(merged, files)
     columns = (
         SpinnerColumn(),
         TextColumn("{task.completed:.0f} pairs of {task.description}"),

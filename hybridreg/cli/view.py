@@ -23,7 +23,10 @@ def command(
     source: Annotated[Path, typer.Argument(help="The cloud that moves: ply, pcd, npy, las, e57, a bag ...")],
     target: Annotated[Path, typer.Argument(help="The cloud that stays.")],
     pose: Annotated[
-        Path | None, typer.Argument(help="A file of a 4x4 matrix, or a result.json; none: as they are.")
+        Path | None,
+        typer.Argument(
+            help="A file of a pose in any form of `register --format`, or a result.json; none: as they are."
+        ),
     ] = None,
     out: Annotated[
         Path | None, typer.Option(help="Write the page here, instead of opening it in the browser.")
@@ -41,7 +44,6 @@ def command(
     from hybridreg.eval.report import orbit_view
     from hybridreg.geometry import se3
     from hybridreg.io import write_text
-    from hybridreg.io.point_files import selection_for
     from hybridreg.io.poses.pose_file import read_pose
     from hybridreg.pair import Pair
     from hybridreg.prior.placing import sized
@@ -51,9 +53,9 @@ def command(
     T = np.eye(4)
     if pose is not None:
         T = se3.rounded(read_pose(pose), str(pose), _ROUNDED)
-    select = options.selections(topic, index, at, accumulate)
+    select = options.selections((source, target), topic, index, at, accumulate)
     moving, still = (
-        PointCloud.of(path, name=name, nonfinite="drop", select=selection_for(path, choice))
+        PointCloud.of(path, name=name, nonfinite="drop", select=choice)
         for name, path, choice in zip(("source", "target"), (source, target), select, strict=True)
     )
     pair = Pair.of(sized(moving, _scale(pose)), still)

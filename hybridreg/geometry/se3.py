@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 # R R^T of a rotation in double precision is off by less.
 _EXACT = 1e-12
+# Where results of registrations keep their pose: ours and Open3D's, small_gicp's.
+_HOLD = ("transformation", "T_target_source")
 
 
 def from_rt(R: Array, t: Array) -> Array:
@@ -124,7 +126,9 @@ def check(T: Any, name: str = "T", tolerance: float = 1e-4) -> Array:
     try:
         matrix = np.asarray(T, dtype=np.float64)
     except (TypeError, ValueError, OverflowError) as error:
-        raise ValueError(f"{name}: expected numbers of shape (4, 4) ({error})") from error
+        held = next((each for each in _HOLD if hasattr(T, each)), "")
+        cure = f"; give its {held}" if held else ""
+        raise ValueError(f"{name}: expected numbers of shape (4, 4) ({error}){cure}") from error
     if matrix.shape != (4, 4):
         raise ValueError(f"{name}: expected shape (4, 4), got {matrix.shape}{_CURES.get(matrix.shape, '')}")
     if not np.isfinite(matrix).all():

@@ -22,8 +22,8 @@ def shorten(text: object, length: int = 60) -> str:
 
 
 @contextmanager
-def foreign_parser(name: str, kind: str) -> Iterator[None]:
-    """Turn whatever a third-party parser raises for a damaged file into one `ValueError`.
+def foreign_parser(name: str, kind: str, cure: str = FETCH_AGAIN) -> Iterator[None]:
+    """Turn whatever a third-party parser raises for a damaged file into one `ValueError`, which tells the cure.
 
     zipfile, numpy's header reader, laspy and lazrs raise a dozen kinds of exceptions on damaged bytes, and
     lazrs' Rust panics do not even derive from `Exception`. Our own parsers do not hide behind this.
@@ -34,7 +34,7 @@ def foreign_parser(name: str, kind: str) -> Iterator[None]:
         raise
     except BaseException as error:
         reason = shorten(str(error) or type(error).__name__, 200)
-        raise fault(name, f"cannot be read as {kind} ({reason})") from error
+        raise fault(name, f"cannot be read as {kind} ({reason})", cure) from error
 
 
 @contextmanager

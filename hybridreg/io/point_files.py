@@ -4,9 +4,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -48,6 +47,10 @@ _ELSEWHERE = {
     ".pvtp": "it names pieces in other files: give one of those, or save all as one .vtp",
     ".mat": "save the array in it as .csv or .npy",
     ".h5": "save the array in it as .npy",
+    ".active": "its recording was cut off: run `rosbag reindex` on it, and rename it to end in .bag",
+    ".zstd": "of a ROS 2 bag give the folder, unpack anything else first",
+    ".yaml": "of a ROS 2 bag give the folder",
+    **dict.fromkeys((".gz", ".bz2", ".xz", ".zip", ".7z", ".tar", ".tgz"), "unpack it first"),
 }
 
 Parser = Callable[[bytes, str], NDArray[np.float64]]
@@ -78,7 +81,12 @@ READERS: dict[str, Reader] = {
 }
 """Readers that go to the file themselves, through other packages; of several clouds in one file they may choose one."""
 
-_SEVERAL = (".bag", ".db3", ".mcap", ".e57", ".lvx2")
+_OF_BAG, _OF_SCANS = ("topic", "index", "at", "accumulate"), ("index", "accumulate")
+# By what one is chosen among the clouds of a file.
+_SEVERAL = {
+    **dict.fromkeys((".bag", ".db3", ".mcap"), _OF_BAG),
+    **dict.fromkeys((".e57", ".lvx2"), _OF_SCANS),
+}
 
 
 def read_points(path: str | os.PathLike[str]) -> NDArray[np.float64]:
@@ -121,15 +129,15 @@ def read_recorded(path: str | os.PathLike[str], selection: Selection = ANY) -> R
     Raises
     ------
     ValueError
-        Also where a cloud is chosen from a file that holds one.
+        Also where a cloud is chosen from a file that holds one, or by what its kind of file does not have.
     """
     path = Path(path)
     if _is_folder(path) and (path / "metadata.yaml").is_file():
         return read_bag(path, selection)
     check_file(path)
     suffix = _suffix(str(path))
-    if selection != ANY and not holds_several(path):
-        raise fault(str(path), f"holds one cloud, {selection} chooses among several", "leave that out")
+    if suffix in READERS or suffix in PARSERS:
+        _check_choice(path, selection)
     if is_helipr(path):
         return read_helipr(path, selection)
     if suffix in READERS:
@@ -147,14 +155,17 @@ def _is_folder(path: Path) -> bool:
         return False
 
 
-def holds_several(path: str | os.PathLike[str]) -> bool:
-    """Whether a file may hold several clouds, to choose from by a `Selection`."""
-    return _suffix(os.fspath(path)) in _SEVERAL or _is_folder(Path(path))
+def choices_in(path: str | os.PathLike[str]) -> tuple[str, ...]:
+    """Names of those fields of a `Selection` by which one cloud is chosen from a file; none where it holds but one."""
+    return _OF_BAG if _is_folder(Path(path)) else _SEVERAL.get(_suffix(os.fspath(path)), ())
 
 
-def selection_for(path: str | os.PathLike[str], choice: Mapping[str, Any]) -> Selection:
-    """A choice made for every file, as it concerns this one: none where it holds one cloud alone."""
-    return Selection(**choice) if holds_several(path) else ANY
+def _check_choice(path: Path, selection: Selection) -> None:
+    known = choices_in(path)
+    useless = ", ".join(f"{key}={value!r}" for key, value in selection.made().items() if key not in known)
+    if useless:
+        held = f"several clouds, of which {' and '.join(known)} choose one" if known else "one cloud"
+        raise fault(str(path), f"holds {held}; {useless} chooses nothing there", "leave that out")
 
 
 def read_viewpoint(path: str | os.PathLike[str]) -> NDArray[np.float64] | None:

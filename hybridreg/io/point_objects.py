@@ -4,6 +4,7 @@ imports."""
 
 from __future__ import annotations
 
+import io
 from collections.abc import Mapping
 from typing import Any, NoReturn
 
@@ -113,9 +114,12 @@ def _from_table(x: Any, names: list[Any], name: str, depth: int) -> Array:
 
 
 def _from_vtk(x: Any, name: str) -> Array:
+    if x.IsA("vtkCompositeDataSet"):
+        _refuse(x, name, "it holds several data sets; give one of them")
     if not vtk_objects.is_cloud(x):
-        cure = "save it as .vtp and give the file, whose surface becomes points, or pass its vertices, x.GetPoints()"
-        _refuse(x, name, f"a surface or a grid is not a cloud; {cure}, where they lie densely")
+        vertices = "x.points" if hasattr(x, "n_points") else "x.GetPoints()"  # of pyvista and of VTK
+        cure = f"save its surface as .vtp and give the file, or pass its vertices, {vertices}, where they lie densely"
+        _refuse(x, name, f"a surface or a grid is not a cloud; {cure}")
     return _from_array(vtk_objects.vtk_points(x, name), name)
 
 
@@ -201,15 +205,16 @@ def _refuse_mesh(x: Any, name: str) -> None:
 
 
 def _has_no_faces(x: Any) -> bool:
-    if hasattr(x, "n_cells") and hasattr(x, "n_verts"):  # VTK counts points as cells
-        return bool(x.n_cells == x.n_verts)
     faces = getattr(x, "faces", None)
     return faces is not None and not callable(faces) and len(faces) == 0
 
 
 def _as_array(x: Any, name: str) -> NDArray[Any]:
     if isinstance(x, (bytes, bytearray)):
-        _refuse(x, name, "bytes have no type; pass numpy.frombuffer(x, dtype).reshape(-1, 3)")
+        cure = "bytes have no type; of a file pass the path, of numbers numpy.frombuffer(x, dtype).reshape(-1, 3)"
+        _refuse(x, name, cure)
+    if isinstance(x, io.IOBase):
+        _refuse(x, name, "pass the path of the file")
     array = np.ma.asarray(x) if np.ma.isMaskedArray(x) else np.asarray(x)
     if isinstance(x, (list, tuple)) and any(np.ma.isMaskedArray(each) for each in x):
         # numpy leaves the masks out

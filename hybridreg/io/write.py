@@ -42,7 +42,10 @@ def write_points(
     array, suffix = np.asarray(points), Path(path).suffix.lower()
     if array.ndim != 2 or array.shape[1] != 3 or array.dtype.kind not in "fiu":
         problem = f"the points to write have the shape {array.shape} and the dtype {array.dtype}"
-        raise fault(str(path), problem, "give real numbers of shape (N, 3)")
+        # A cloud of ours counts its points from its offset.
+        ours = hasattr(points, "points") and hasattr(points, "offset")
+        cure = "give cloud.points + cloud.offset" if ours else "give real numbers of shape (N, 3)"
+        raise fault(str(path), problem, cure)
     if suffix not in (".ply", ".pcd"):
         raise fault(
             str(path), f"clouds are not written as {suffix!r}", "choose a name ending in .ply or .pcd"

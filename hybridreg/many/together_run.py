@@ -3,9 +3,7 @@
 
 from __future__ import annotations
 
-import glob
 import os
-import re
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
 from pathlib import Path
@@ -22,6 +20,7 @@ from hybridreg.io.csv_cells import csv_text
 from hybridreg.io.lock import folder_lock
 from hybridreg.io.write import write_json
 from hybridreg.many.alignment import Alignment
+from hybridreg.many.file_patterns import files_named
 from hybridreg.many.link_file import LinkFile
 from hybridreg.many.link_search import aligned
 from hybridreg.output.pose_files import pose_files
@@ -31,22 +30,16 @@ _LINKS, _TABLE, _ROLES, _ALL = "links.jsonl", "poses.csv", "links.csv", "alignme
 
 
 def files_of(what: Sequence[str]) -> list[str]:
-    """Files of clouds, two or more: paths in the order given, patterns such as `scans/*.pcd` in that of their names, in
-    which 2 stands before 10.
+    """Files of clouds, two or more, by their paths or patterns (`file_patterns.files_named`).
 
     Raises
     ------
     FileNotFoundError
         No file fits a pattern.
     ValueError
-        One file, or one that is named twice.
+        One file, one that is named twice, or a folder of clouds.
     """
-    files: list[str] = []
-    for each in what:
-        found = [each] if os.path.exists(each) else sorted(glob.glob(each, recursive=True), key=_by_number)
-        if not found:
-            raise FileNotFoundError(f"{each}: no file fits this (the current folder is {Path.cwd()})")
-        files += found
+    files = files_named(what)
     if len(files) < 2:
         raise ValueError(
             f"{' '.join(what)}: one cloud, two or more are needed; give a pattern in quotes, or more paths"
@@ -55,10 +48,6 @@ def files_of(what: Sequence[str]) -> list[str]:
     if twice:
         raise ValueError(f"{twice[0]}: named twice; give each cloud once")
     return files
-
-
-def _by_number(name: str) -> list[Any]:
-    return [int(part) if part.isdigit() else part for part in re.split(r"([0-9]+)", name)]
 
 
 def run(

@@ -18,6 +18,8 @@ from hybridreg import testing
 from hybridreg.cli.app import app
 from hybridreg.geometry import se3
 from hybridreg.geometry.fitness import Overlay
+from hybridreg.io import write_points
+from hybridreg.io.poses.pose_file import read_pose
 from hybridreg.pipeline import Trace
 from hybridreg.result import RegistrationResult
 
@@ -228,3 +230,37 @@ def test_the_module_runs_as_a_command(clouds: tuple[str, str]) -> None:
     assert done.stdout == ""
     assert done.stderr.startswith("hybridreg: none.ply: ")
     assert done.stderr.count("\n") == 1
+
+
+@pytest.mark.usefixtures("verdict")
+def test_one_cloud_as_source_and_target_is_told(clouds: tuple[str, str]) -> None:
+    path = Path(clouds[0])
+    told = call("register", path, path.parent / ".." / path.parent.name / path.name, *SMALL).stderr
+    assert "source and target are the same cloud" in told
+    assert "name two files" in told
+    assert "the same cloud" not in call("register", *clouds, *SMALL).stderr
+
+
+@pytest.mark.parametrize("option", ["--aligned", "--merged"])
+def test_no_cloud_is_written_over_one_that_is_read(tmp_path: Path, option: str) -> None:
+    pair = testing.sample_pair()[0]
+    write_points(tmp_path / "a.ply", pair.source.points)
+    write_points(tmp_path / "b.ply", pair.target.points)
+    (tmp_path / "link.ply").symlink_to(tmp_path / "b.ply")
+    for name in ("a.ply", "b.ply", "link.ply"):
+        told = refused(call("register", tmp_path / "a.ply", tmp_path / "b.ply", option, tmp_path / name))
+        assert f"{name}: is one of the clouds that are read, and would be lost; choose another name" in told
+
+
+@pytest.mark.usefixtures("verdict")
+def test_out_gets_the_pose_in_the_form_that_was_asked_for_too(
+    clouds: tuple[str, str], tmp_path: Path
+) -> None:
+    out = tmp_path / "run"
+    for form in ("tum", "ros-tf", "matrix"):
+        result = call("register", *clouds, *SMALL, "--out", out, "--format", form)
+        assert result.exit_code == 0, result.output
+        assert [f.name for f in out.glob("pose.*")] == ([] if form == "matrix" else [f"pose.{form}.txt"])
+        if form != "matrix":
+            T = json.loads((out / "result.json").read_text())["transformation"]
+            np.testing.assert_allclose(read_pose(out / f"pose.{form}.txt"), T, atol=1e-12)

@@ -169,7 +169,7 @@ def test_result_is_a_copy(rgb):
         (np.zeros((2, 40, 50, 3), np.uint8), r"shape \(2, 40, 50, 3\)"),
         (np.zeros((0, 5, 3), np.uint8), "no pixels"),
         (np.zeros((4, 5), np.int64), "dtype int64.*uint8"),
-        (np.zeros((4, 5), bool), "dtype bool"),
+        (np.zeros((4, 5), bool), r"dtype bool; give floats: numpy\.asarray\(image, float"),
         (np.full((4, 5), "a"), "dtype <U1"),
         (np.full((4, 5), 200.0), "from 200 to 200, not in"),
         (np.full((4, 5), -0.5), "from -0.5"),

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import base64
 import contextlib
+import io
 from collections import namedtuple
 from types import SimpleNamespace
 from typing import Any
@@ -490,6 +491,29 @@ def test_vtk() -> None:
     assert "empty" in refused(data.vtkPolyData())
 
 
+def test_grids_of_vtk_are_clouds_where_their_cells_are_points_or_they_lie_in_rows() -> None:
+    core, data = (pytest.importorskip(f"vtkmodules.vtkCommon{each}") for each in ("Core", "DataModel"))
+    convert = pytest.importorskip("vtkmodules.util.numpy_support").numpy_to_vtk
+    points = core.vtkPoints()
+    points.SetData(convert(P, deep=True))
+    loose, rows, volume = data.vtkUnstructuredGrid(), data.vtkStructuredGrid(), data.vtkStructuredGrid()
+    for grid in (loose, rows, volume):
+        grid.SetPoints(points)
+    vertex, tetra = 1, 10  # VTK's numbers of these kinds of cells
+    for k in range(len(P)):
+        loose.InsertNextCell(vertex, 1, [k])
+    rows.SetDimensions(len(P) // 2, 2, 1)
+    volume.SetDimensions(len(P) // 4, 2, 2)
+    same(loose)
+    same(rows)
+    loose.InsertNextCell(tetra, 4, [0, 1, 2, 3])
+    image = data.vtkImageData()
+    image.SetDimensions(5, 5, 5)
+    for grid in (loose, volume, image):
+        assert "a surface or a grid is not a cloud; save its surface as .vtp" in refused(grid)
+    assert "give one of them" in refused(data.vtkMultiBlockDataSet())
+
+
 def test_a_scene_of_clouds_alone() -> None:
     trimesh = pytest.importorskip("trimesh")
     scene = trimesh.Scene()
@@ -511,6 +535,7 @@ def test_a_scene_of_clouds_alone() -> None:
         (P[:, :2], "three coordinates"),
         (np.c_[P, P, P, P].T, "x[:3].T"),
         (b"abc", "frombuffer"),
+        (io.BytesIO(b"ply"), "pass the path of the file"),
         (zip(*P.T, strict=True), "column_stack"),
         (object(), "column_stack"),
         (lambda: P, "column_stack"),

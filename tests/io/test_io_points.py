@@ -144,6 +144,8 @@ def test_text_under_every_ending(cloud, ending):
         ("a.ptx", b"4", r"\.pts"),
         ("a.pcap", b"\xd4\xc3\xb2\xa1", "sensor's own tool"),
         ("a.mat", b"MATLAB 5.0", "save the array"),
+        ("a.csv.gz", b"\x1f\x8b\x08", "unpack it first"),
+        ("a.db3.zstd", b"\x28\xb5\x2f\xfd", "of a ROS 2 bag give the folder"),
     ],
 )
 def test_files_of_other_tools_name_their_cure(name, data, cure):

@@ -116,3 +116,13 @@ def test_what_json_cannot_express_leaves_the_old_file(tmp_path, thing):
     with pytest.raises(ValueError, match=r"a\.json: cannot be written as JSON"):
         write_json(tmp_path / "a.json", {"new": thing})
     assert json.loads((tmp_path / "a.json").read_text()) == {"old": 1}
+
+
+def test_a_cloud_is_written_with_its_offset(tmp_path):
+    from hybridreg.cloud import PointCloud
+
+    cloud = PointCloud.of(np.random.default_rng(0).normal(size=(50, 3)) + [500_000.0, 0.0, 0.0])
+    with pytest.raises(ValueError, match=r"give cloud\.points \+ cloud\.offset"):
+        write_points(tmp_path / "a.ply", cloud)
+    write_points(tmp_path / "a.ply", cloud.points + cloud.offset)
+    assert read_points(tmp_path / "a.ply")[:, 0].min() > 499_000.0

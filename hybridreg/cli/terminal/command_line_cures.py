@@ -10,6 +10,8 @@ from hybridreg.cli.terminal import command_options
 _ONLY_PYTHON = "which only Python can give: Pipeline.run(pair, matches=...)"
 _TOPIC = 'only `hybridreg register --topic` and Python (hybridreg.read(path, topic="...")) choose one'
 
+_INDEX = "`hybridreg register --index` and Python (hybridreg.read(path, index=...)) choose another"
+
 # A phrase of advice, and the same in command-line terms: the first whose options the running command has. Where it has
 # none, the stages' fields stand in a TOML file.
 CURES = (
@@ -19,6 +21,7 @@ CURES = (
     (r"choose a (smaller|larger) voxel\b", (r"choose a \1 --voxel", r"choose a \1 voxel")),
     (r"a (smaller|larger) voxel or another unit", (r"a \1 --voxel or another unit",)),
     (r'choose one with topic="..."', ("choose one with --topic", _TOPIC)),
+    (r"choose another index", ("choose another --index", _INDEX)),
     (r"without weights=\.\.\.", ("without --set SLOT.weights=...", "without weights = ...")),
     (
         r"insist with untrained=True",
@@ -38,6 +41,9 @@ VALUES = (
     (r"\bvoxel=(\S+) must be", r"--voxel \1 must be"),
     (r"\bmax_translation=", "--max-translation "),
     (r"\bmax_rotation=", "--max-rotation "),
+    (r"\bindex=(\S+) and at=(\S+): ", r"--index \1 and --at \2: "),
+    (r"\bat=(\S+) must be", r"--at \1 must be"),
+    (r"\baccumulate=(\S+) must be", r"--accumulate \1 must be"),
     (r"\bvoxel=(\S+) was given", r"--voxel \1 was given"),
     (r"\bvoxel=(\S+) contradicts", r"--voxel \1 contradicts"),
     (r"\baccelerator='(\w+)': ", r"--accelerator \1: "),

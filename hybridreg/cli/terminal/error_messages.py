@@ -32,6 +32,8 @@ _CURES = {
     errno.EDQUOT: "make room, then run the same command again",
     errno.EFBIG: "raise the limit of a file's size (ulimit -f), then run the same command again",
     errno.EROFS: "name another folder",
+    errno.EEXIST: "name another folder: a file of this name is in the way",
+    errno.ENOTDIR: "name another folder: a file is in the way",
     errno.EACCES: "change the permissions, or name another folder",
 }
 

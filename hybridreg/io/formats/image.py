@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import os
+import warnings
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from hybridreg.io.faults import fault
 from hybridreg.io.formats.image_size import image_size
+from hybridreg.io.meaning.image_objects import pixels_in
 from hybridreg.io.signatures import kind_of
 from hybridreg.io.whole_files import read_whole
 from hybridreg.runtime.optional_packages import load
@@ -21,6 +23,8 @@ _NOT_AN_IMAGE = "give an image that an image viewer opens (.png, .jpg, .tif, .bm
 _MOST_PIXELS = 210_000_000
 _ROWS = 256
 _ROUNDING = 1e-6  # by which a float image may leave [0, 1]
+# Cameras of 10 and 12 bits fill so much of 16, where nobody scales what they give.
+_TWELVE_BITS = 4095
 
 
 def read_image(path: str | os.PathLike[str]) -> NDArray[np.uint8]:
@@ -89,14 +93,14 @@ def _undecodable(data: bytes, name: str) -> ValueError:
     return fault(name, f"cannot be decoded as an image: {what}, {len(data)} bytes", _NOT_AN_IMAGE)
 
 
-def as_image(image: ArrayLike, name: str = "image") -> NDArray[np.uint8]:
+def as_image(image: ArrayLike | Any, name: str = "image") -> NDArray[np.uint8]:
     """Convert pixels to the one form that all stages take.
 
     Parameters
     ----------
     image : array of shape (H, W), (H, W, 1), (H, W, 3) or (H, W, 4)
-        Grey, RGB or RGBA (alpha is dropped); uint8, uint16 (full range) or floats in [0, 1]. OpenCV's own
-        `imread` gives BGR: turn that with `image[..., ::-1]`.
+        Grey, RGB or RGBA (alpha is dropped); uint8, uint16 (full range) or floats in [0, 1]; also Pillow's images,
+        tensors, and messages sensor_msgs/Image. OpenCV's own `imread` gives BGR: turn that with `image[..., ::-1]`.
     name : str
         What an error message calls it.
 
@@ -110,7 +114,7 @@ def as_image(image: ArrayLike, name: str = "image") -> NDArray[np.uint8]:
     ValueError
         Another shape or dtype, no pixels, floats outside [0, 1] or not finite.
     """
-    pixels = np.asarray(image)
+    pixels = pixels_in(image, name)
     if pixels.ndim == 2:
         pixels = pixels[:, :, None]
     _check_shape(pixels, name)
@@ -121,10 +125,11 @@ def as_image(image: ArrayLike, name: str = "image") -> NDArray[np.uint8]:
 def _check_shape(pixels: NDArray[Any], name: str) -> None:
     shape = pixels.shape
     if pixels.ndim == 3 and shape[2] > 4 and shape[0] in (1, 3, 4):
-        cure = "put the channels last: numpy.moveaxis(image, 0, -1)"
+        cure = "put the channels last: numpy.moveaxis(image, 0, -1), of a tensor image.permute(1, 2, 0)"
         raise fault(name, f"has the shape {shape}, channels first", cure)
     if pixels.ndim != 3 or shape[2] not in (1, 3, 4):
-        raise fault(name, f"has the shape {shape}", "give (H, W), (H, W, 1), (H, W, 3) or (H, W, 4)")
+        cure = "give (H, W), (H, W, 1), (H, W, 3) or (H, W, 4)" + (": image[0]" if len(shape) == 4 else "")
+        raise fault(name, f"has the shape {shape}", cure)
     if pixels.size == 0:
         raise fault(name, f"has the shape {shape}, no pixels", "give an image of at least one pixel")
 
@@ -133,19 +138,39 @@ def _eight_bits(pixels: NDArray[Any], name: str) -> NDArray[Any]:
     if pixels.dtype == np.uint8:
         return pixels
     if pixels.dtype.kind == "u" and pixels.dtype.itemsize == 2:
+        _warn_of_dark(int(pixels.max()), name)
         rounded = np.empty(pixels.shape, dtype=np.uint8)
         for row in range(0, len(pixels), _ROWS):  # so that no copy of four bytes each is made of all
             rounded[row : row + _ROWS] = (pixels[row : row + _ROWS].astype(np.uint32) * 255 + 32767) // 65535
         return rounded
     if pixels.dtype.kind != "f":
-        cure = "give uint8, uint16 or floats in [0, 1]; for values up to 255 use image.astype(numpy.uint8)"
-        raise fault(name, f"has the dtype {pixels.dtype}", cure)
+        raise fault(name, f"has the dtype {pixels.dtype}", _as_another_type(pixels))
     low, high = float(pixels.min()), float(pixels.max())
     if not (low >= -_ROUNDING and high <= 1 + _ROUNDING):  # written so that NaN fails it
-        raise fault(
-            name, f"has floats from {low:g} to {high:g}, not in [0, 1]", "divide it by its full scale"
-        )
+        raise fault(name, f"has floats from {low:g} to {high:g}, not in [0, 1]", _as_shares(low, high))
     return np.rint(np.clip(pixels, 0, 1) * 255)
+
+
+def _warn_of_dark(high: int, name: str) -> None:
+    if 0 < high <= _TWELVE_BITS:
+        problem = f"the values of its 16 bits reach {high} of 65535, which is nearly black"
+        warnings.warn(f"{name}: {problem}; scale them to the full range", UserWarning, stacklevel=5)
+
+
+def _as_another_type(pixels: NDArray[Any]) -> str:
+    if pixels.dtype.kind == "b":
+        return "give floats: numpy.asarray(image, float)"
+    if pixels.dtype.kind in "iu" and pixels.min() >= 0 and pixels.max() <= 65535:
+        return f"convert it: numpy.asarray(image, numpy.{'uint8' if pixels.max() <= 255 else 'uint16'})"
+    return "give uint8, uint16 or floats in [0, 1]"
+
+
+def _as_shares(low: float, high: float) -> str:
+    if not np.isfinite((low, high)).all():
+        return "give a value to pixels that have none: numpy.nan_to_num(image)"
+    if low < 0.0:
+        return "undo its normalisation, so that black is 0 and white is 1"
+    return "divide it by its full scale" + (", 255" if high <= 255.0 else "")
 
 
 def _decode(data: bytes) -> NDArray[Any] | None:

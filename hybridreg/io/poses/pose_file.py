@@ -52,6 +52,9 @@ def _of_json(values: Any, name: str) -> Any:
     if not isinstance(values, dict):
         return values
     found = next((key for key in _KEYS if key in values), None)
+    if found is None and "T_source_target" in values:
+        cure = "invert it with numpy.linalg.inv, and call that T_target_source"
+        raise fault(name, "its T_source_target maps target points to source points", cure)
     if found is None:
         problem = f"has no entry {' or '.join(_KEYS)} among {shorten(', '.join(values), 200)}"
         raise fault(name, problem, "call the matrix, four rows of four numbers, T_target_source")

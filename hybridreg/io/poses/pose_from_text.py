@@ -9,18 +9,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hybridreg.io.faults import fault, shorten
-from hybridreg.io.poses.pose_numbers import EXPECTED, pose_of_angles, pose_of_numbers
+from hybridreg.io.faults import fault
+from hybridreg.io.poses.pose_numbers import ONE_POSE, number_of, pose_of_angles, pose_of_numbers
+from hybridreg.io.poses.ros_publisher import PUBLISHER, pose_of_publisher
 
 Array = NDArray[np.float64]
 
 _COMMENTS = ("#", "//", "%")
-_PUBLISHER = "static_transform_publisher"
-_OPTIONS = ("x", "y", "z", "qx", "qy", "qz", "qw")
 _ORIGIN = re.compile(r"<origin\b([^>]*)>")
 _NUMBERS = re.compile(r"\d|\bnan\b", re.IGNORECASE)
 _BRACKETS = str.maketrans("[](){}", "      ")
-_ONE = "keep the one from the source to the target"
 
 
 def pose_of_text(text: str, name: str) -> Array:
@@ -32,14 +30,14 @@ def pose_of_text(text: str, name: str) -> Array:
     ValueError
         Several poses, no pose, or as `pose_of_numbers`.
     """
-    if _PUBLISHER in text:
-        return _of_publisher(text, name)
+    if PUBLISHER in text:
+        return pose_of_publisher(text, name)
     if "<origin" in text or "<robot" in text:
         return _of_origin(text, name)
     text = text.replace(",", ".").replace(";", " ") if ";" in text else text.replace(",", " ")
     lines = [line.strip() for line in text.translate(_BRACKETS).splitlines()]
     rows = [line.split() for line in lines if not line.startswith(_COMMENTS) and _NUMBERS.search(line)]
-    return pose_of_numbers(_as_rows([[_number(word, name) for word in row] for row in rows]), name)
+    return pose_of_numbers(_as_rows([[number_of(word, name) for word in row] for row in rows]), name)
 
 
 def _as_rows(rows: list[list[float]]) -> list[Any]:
@@ -48,34 +46,16 @@ def _as_rows(rows: list[list[float]]) -> list[Any]:
     return list(rows) if alike else [value for row in rows for value in row]
 
 
-def _number(word: str, name: str) -> float:
-    try:
-        return float(word)
-    except ValueError as error:
-        raise fault(name, f"holds {shorten(word)} where a number of a pose is needed", EXPECTED) from error
-
-
-def _of_publisher(text: str, name: str) -> Array:
-    found = {each: re.findall(rf"--{each}[ =]+(\S+)", text) for each in _OPTIONS}
-    several = max(len(values) for values in found.values())
-    if several > 1:
-        raise fault(name, f"holds {several} poses", _ONE)
-    missing = [f"--{each}" for each, values in found.items() if not values]
-    if missing:
-        raise fault(name, f"its {_PUBLISHER} has no {', '.join(missing)}", EXPECTED)
-    return pose_of_numbers([_number(values[0], name) for values in found.values()], name)
-
-
 def _of_origin(text: str, name: str) -> Array:
     origins = _ORIGIN.findall(text)
     if len(origins) != 1:
-        raise fault(name, f"holds {len(origins)} <origin> elements", _ONE)
+        raise fault(name, f"holds {len(origins)} <origin> elements", ONE_POSE)
     return pose_of_angles(_attribute(origins[0], "xyz", name), _attribute(origins[0], "rpy", name))
 
 
 def _attribute(origin: str, wanted: str, name: str) -> list[float]:
     found = re.search(rf"\b{wanted}\s*=\s*[\"']([^\"']*)[\"']", origin)
-    values = [_number(word, name) for word in found.group(1).split()] if found else [0.0, 0.0, 0.0]
+    values = [number_of(word, name) for word in found.group(1).split()] if found else [0.0, 0.0, 0.0]
     if len(values) != 3:
         raise fault(name, f"its {wanted} holds {len(values)} numbers", "give three")
     return values

@@ -16,6 +16,9 @@ Array = NDArray[np.float64]
 EXPECTED = "write a pose as four lines of four numbers, or as one line: x y z qx qy qz qw"
 """What to do with a file that holds no pose."""
 
+ONE_POSE = "keep the one from the source to the target"
+"""What to do with a file of several."""
+
 # How far a quaternion that was written with few digits may be from length 1; by hand.
 _ROUNDED = 0.03
 _MATRIX, _QUATERNION, _TIMED = (12, 16), 7, 8
@@ -37,7 +40,7 @@ def pose_of_numbers(values: Any, name: str) -> Array:
     if array.shape == (4, 3):
         raise fault(name, "holds four rows of three numbers", f"transpose it: {EXPECTED}")
     if array.ndim > 1 and len(array) > 1 and array[0].size in (12, 16, _QUATERNION, _TIMED):
-        raise fault(name, f"holds {len(array)} poses", "keep the one from the source to the target")
+        raise fault(name, f"holds {len(array)} poses", ONE_POSE)
     in_one_row = array.ndim == 1 or len(array) == 1
     if numbers.size in (_QUATERNION, _TIMED) and in_one_row:
         return _placed(numbers[-7:-4], _rotation(numbers[-4:], name))
@@ -46,6 +49,20 @@ def pose_of_numbers(values: Any, name: str) -> Array:
     T = np.eye(4)
     T.flat[: numbers.size] = numbers
     return T
+
+
+def number_of(word: str, name: str) -> float:
+    """A word of a pose as a number.
+
+    Raises
+    ------
+    ValueError
+        It is none.
+    """
+    try:
+        return float(word)
+    except ValueError as error:
+        raise fault(name, f"holds {shorten(word)} where a number of a pose is needed", EXPECTED) from error
 
 
 def pose_of_angles(position: Sequence[float], roll_pitch_yaw: Sequence[float]) -> Array:

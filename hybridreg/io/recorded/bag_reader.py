@@ -11,25 +11,32 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hybridreg.io.faults import fault, foreign_parser
+from hybridreg.io.faults import FETCH_AGAIN, fault, foreign_parser
 from hybridreg.io.recorded import livox_message, ros_messages
-from hybridreg.io.recorded.foxglove_clouds import is_ros, read_foxglove
-from hybridreg.io.recorded.recording import Recorded, Selection, chosen_topic
+from hybridreg.io.recorded.mcap_clouds import is_ros, read_mcap
+from hybridreg.io.recorded.recording import (
+    CLOUDS_OF_ROS,
+    RECOVER,
+    Recorded,
+    Selection,
+    check_filled,
+    chosen_topic,
+)
 from hybridreg.runtime.optional_packages import load
 
 Array = NDArray[np.float64]
-_CLOUD = "sensor_msgs/msg/PointCloud2"
-_LIVOX = (
-    "livox_ros_driver/msg/CustomMsg",
-    "livox_ros_driver2/msg/CustomMsg",
-    "livox_interfaces/msg/CustomMsg",
-)
 _NANOSECONDS = 1e9
+# What may mend a recording that was cut off, by the ending of its file.
+_CURES = {
+    ".bag": "if its recording was cut off, run `rosbag reindex` on it",
+    ".mcap": f"if its recording was cut off, {RECOVER}",
+}
+_ZSTD = b"\x28\xb5\x2f\xfd"
 
 
 def read_bag(path: Path, selection: Selection) -> Recorded:
-    """Read clouds of one topic: `sensor_msgs/PointCloud2` of any layout, Livox's `CustomMsg`, and `foxglove.PointCloud`
-    of MCAP files that no ROS wrote.
+    """Read clouds of one topic: `sensor_msgs/PointCloud2` of any layout, `PointCloud`, `LaserScan`, Livox's
+    `CustomMsg`, and in MCAP files `foxglove.PointCloud`.
 
     Parameters
     ----------
@@ -43,13 +50,14 @@ def read_bag(path: Path, selection: Selection) -> Recorded:
         Without rosbags, or mcap.
     """
     if path.suffix.lower() == ".mcap" and path.is_file() and not is_ros(path):
-        return read_foxglove(path, selection)
+        return read_mcap(path, selection)
+    _check_ending(path)
     name = str(path)
     anyreader = load("rosbags.highlevel", f"{name}: a bag").AnyReader
     typesys = load("rosbags.typesys", f"{name}: a bag")
     # Bags of ROS 2 before Iron do not hold their messages' definitions.
     store = typesys.get_typestore(typesys.Stores.ROS2_HUMBLE)
-    with foreign_parser(name, "a ROS bag"):
+    with foreign_parser(name, "a ROS bag", _CURES.get(path.suffix, FETCH_AGAIN)):
         reader = anyreader([path], default_typestore=store)
         reader.open()
     try:
@@ -68,26 +76,39 @@ def read_bag(path: Path, selection: Selection) -> Recorded:
             problem = f"holds {len(chosen)} clouds of this topic from {selection.at or 0:g} s on"
             cure = f"it lasts {length:.1f} s, choose an earlier time"
             raise fault(name, f"{problem}, {selection.accumulate} were asked for", cure)
-        return Recorded(np.vstack(list(_clouds(reader, chosen, name))), holed=True)
+        points = np.vstack(list(_clouds(reader, chosen, name)))
+        return check_filled(Recorded(points, holed=True), name)
     finally:
         reader.close()
+
+
+def _check_ending(path: Path) -> None:
+    # rosbags goes by the ending alone, which it knows in lower case.
+    if path.is_dir() and path.suffix.lower() == ".bag":
+        raise fault(
+            str(path), "is the folder of a ROS 2 bag", f"rename it so that it does not end in {path.suffix}"
+        )
+    if path.is_file() and path.suffix != path.suffix.lower():
+        raise fault(str(path), f"ends in {path.suffix}", f"rename it to end in {path.suffix.lower()}")
 
 
 def _of_topic(reader: Any, topic: str | None, name: str) -> list[Any]:
     found: dict[str, list[Any]] = {}
     for connection in reader.connections:
-        if connection.msgtype in (_CLOUD, *_LIVOX):
+        if connection.msgtype in (*ros_messages.KINDS, *livox_message.KINDS):
             found.setdefault(connection.topic, []).append(connection)
     counts = {each: sum(c.msgcount for c in found[each]) for each in found}
     others = [connection.msgtype for connection in reader.connections]
-    return found[
-        chosen_topic(counts, topic, others, name, "give a bag with PointCloud2 or Livox's CustomMsg")
-    ]
+    flat = [each.topic for each in reader.connections if each.msgtype == ros_messages.FLAT]
+    return found[chosen_topic(counts, topic, others, name, f"clouds are {CLOUDS_OF_ROS}", flat)]
 
 
 def _clouds(reader: Any, chosen: list[Any], name: str) -> Iterator[Array]:
     for connection, _, raw in chosen:
-        if connection.msgtype in _LIVOX:
+        if reader.is2 and raw[:4] == _ZSTD:
+            cure = "give the folder of the bag, whose metadata.yaml tells that"
+            raise fault(name, "each of its messages is compressed", cure)
+        if connection.msgtype in livox_message.KINDS:
             yield livox_message.points(bytes(raw), cdr=reader.is2, name=name)
             continue
         with foreign_parser(name, "a ROS bag"):

@@ -22,7 +22,7 @@ _STATES = ("cartesianInvalidState", "sphericalInvalidState")
 
 
 def read_e57(path: Path, selection: Selection) -> Recorded:
-    """Read all scans in the file's frame, or the one of `index`; points without a range are left out.
+    """Read all scans in the file's frame, or those of `index` and `accumulate`; points without a range are left out.
 
     A scan's coordinates count from its scanner, and its pose puts them into the file's frame, so that each pose tells
     where its points were seen from. A file of one scan without a pose may be a map: its place is not told then.
@@ -43,7 +43,7 @@ def read_e57(path: Path, selection: Selection) -> Recorded:
         if count == 0:
             raise fault(name, "holds no scans", "export it with its points")
         first, last = 0, count
-        if selection.index is not None:
+        if selection.index is not None or selection.accumulate > 1:
             first = selection.first_of(count, name, "scans")
             last = first + selection.accumulate
         scans = [_scan(file, row, name) for row in range(first, last)]
@@ -93,6 +93,7 @@ def _rotation(quaternion: Array, name: str) -> Array:
 
     length = float(np.linalg.norm(quaternion))
     if not 0.5 < length < 2.0:
-        raise fault(name, f"a scan's rotation is the quaternion {quaternion.tolist()}, no rotation")
+        problem = f"a scan's rotation is the quaternion {quaternion.tolist()}, no rotation"
+        raise fault(name, problem, "export it with the poses of its scans, or without any")
     rotation: Array = Rotation.from_quat(np.roll(quaternion, -1)).as_matrix()  # w stands last there
     return rotation

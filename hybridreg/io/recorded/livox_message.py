@@ -11,6 +11,13 @@ from numpy.typing import NDArray
 from hybridreg.io.faults import fault
 from hybridreg.io.record_fields import stack_axes
 
+KINDS = (
+    "livox_ros_driver/msg/CustomMsg",
+    "livox_ros_driver2/msg/CustomMsg",
+    "livox_interfaces/msg/CustomMsg",
+)
+"""What the drivers of Livox call the message."""
+
 # Header, timebase, point count, lidar id and three reserved bytes stand before the points; of the header the frame's
 # name has any length. Of one point: offset_time, x, y, z, reflectivity, tag, line.
 _POINT = {"names": ["x", "y", "z"], "formats": ["<f4"] * 3, "offsets": [4, 8, 12]}

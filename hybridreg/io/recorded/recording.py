@@ -3,10 +3,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
-from numbers import Integral
-from typing import NamedTuple
+from collections.abc import Collection, Iterable, Mapping
+from dataclasses import dataclass, fields
+from numbers import Integral, Real
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +14,12 @@ from numpy.typing import NDArray
 from hybridreg.io.faults import fault
 
 Array = NDArray[np.float64]
+
+RECOVER = "run `mcap recover` on it"
+"""What to do with an MCAP file whose recording was cut off."""
+
+CLOUDS_OF_ROS = "PointCloud2, PointCloud, LaserScan and Livox's CustomMsg"
+"""What is read of messages of ROS."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -48,7 +54,9 @@ class Selection:
             raise ValueError(f"index={self.index} and at={self.at}: leave one of them out")
         if self.index is not None and (isinstance(self.index, bool) or not isinstance(self.index, Integral)):
             raise ValueError(f"index={self.index!r} must be a whole number, 0 for the first")
-        if self.at is not None and not (isinstance(self.at, (int, float)) and 0.0 <= self.at < np.inf):
+        if self.at is not None and (
+            isinstance(self.at, bool) or not (isinstance(self.at, Real) and 0.0 <= self.at < np.inf)
+        ):
             raise ValueError(f"at={self.at!r} must be seconds after the start, 0 or more")
         if (
             isinstance(self.accumulate, bool)
@@ -56,6 +64,12 @@ class Selection:
             or self.accumulate < 1
         ):
             raise ValueError(f"accumulate={self.accumulate!r} must be a whole number, 1 or more")
+
+    def made(self) -> dict[str, Any]:
+        """What was chosen, by the names above."""
+        return {
+            each.name: value for each in fields(self) if (value := getattr(self, each.name)) != each.default
+        }
 
     def first_of(self, count: int, name: str, what: str) -> int:
         """The row that `index` means among `count`, with `accumulate` of them from there on.
@@ -77,9 +91,15 @@ ANY = Selection()
 
 
 def chosen_topic(
-    counts: Mapping[str, int], asked: str | None, others: Iterable[str], name: str, cure: str
+    counts: Mapping[str, int],
+    asked: str | None,
+    others: Iterable[str],
+    name: str,
+    cure: str,
+    flat: Collection[str] = (),
 ) -> str:
-    """The topic whose clouds are read, by the number of clouds of each; `others` are the kinds of what else there is.
+    """The topic whose clouds are read, by the number of clouds of each; `others` are the kinds of what else there is,
+    `flat` the topics of 2-D scanners: beside clouds in space they are read where they are asked for.
 
     Raises
     ------
@@ -90,11 +110,14 @@ def chosen_topic(
     if not counts:
         rest = ", ".join(sorted(set(others))[:8]) or "nothing at all"
         raise fault(name, f"holds no clouds, but {rest}", cure)
-    if asked is None and len(counts) > 1:
+    if asked is not None:
+        if asked not in counts:
+            raise fault(name, f"holds no clouds of the topic {asked!r}", f"it has {told}")
+        return asked
+    likely = [each for each in counts if each not in flat] or list(counts)
+    if len(likely) > 1:
         raise fault(name, f"holds clouds of {len(counts)} topics: {told}", 'choose one with topic="..."')
-    if asked is not None and asked not in counts:
-        raise fault(name, f"holds no clouds of the topic {asked!r}", f"it has {told}")
-    return next(iter(counts)) if asked is None else asked
+    return likely[0]
 
 
 class Recorded(NamedTuple):
@@ -113,3 +136,16 @@ class Recorded(NamedTuple):
     of_point: NDArray[np.int64] | None = None
     holed: bool = False
     guess: Array | None = None
+
+
+def check_filled(recorded: Recorded, name: str) -> Recorded:
+    """The clouds of a recording, in which the first message is often empty.
+
+    Raises
+    ------
+    ValueError
+        They hold no points.
+    """
+    if not len(recorded.points):
+        raise fault(name, "the cloud chosen from it is empty", "choose another index")
+    return recorded

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""ROS's sensor_msgs/PointCloud2 without ROS: any object or dictionary with its fields."""
+"""Clouds of ROS without ROS, sensor_msgs/PointCloud2, PointCloud and LaserScan: any object or dictionary with their
+fields."""
 
 from __future__ import annotations
 
@@ -15,6 +16,7 @@ from numpy.typing import NDArray
 from hybridreg.io.arrays import TOGETHER, array_points
 from hybridreg.io.column_names import axes_in
 from hybridreg.io.faults import fault, shorten
+from hybridreg.io.recorded import laser_scan
 
 Array = NDArray[np.float64]
 
@@ -23,26 +25,38 @@ _HAS = ("fields", "point_step", "row_step", "width", "height", "data")
 _TYPES = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 8: "f8"}
 
 
+FLAT = "sensor_msgs/msg/LaserScan"
+KINDS = ("sensor_msgs/msg/PointCloud2", "sensor_msgs/msg/PointCloud", FLAT)
+"""What ROS 2 calls them."""
+
+
 def is_cloud(x: Any) -> bool:
-    """Whether an object, or a dictionary, has the fields of a PointCloud2."""
-    return all(each in x if isinstance(x, Mapping) else hasattr(x, each) for each in _HAS)
+    """Whether an object, or a dictionary, has the fields of a PointCloud2 or a LaserScan."""
+    held = all(each in x if isinstance(x, Mapping) else hasattr(x, each) for each in _HAS)
+    return held or laser_scan.is_scan(x)
 
 
 def points(message: Any, name: str) -> Array:
-    """x, y and z of a PointCloud2, its padding and its other fields left out; shape (N, 3).
+    """x, y and z of a cloud, its padding and its other fields left out; shape (N, 3).
 
     A dictionary is read as `json` makes it of what rosbridge sends, its `data` in base64.
 
     Raises
     ------
     ValueError
-        The message holds fewer bytes than it promises, or no fields x, y and z.
+        The message holds fewer bytes than it promises, or no fields x, y and z; or as `laser_scan.points`.
     """
+    if laser_scan.is_scan(message):
+        return laser_scan.points(message, name)
     message = _object(message)
+    if not hasattr(message, "point_step"):  # a PointCloud, the older message
+        return np.array([(each.x, each.y, each.z) for each in message.points], dtype=np.float64).reshape(
+            -1, 3
+        )
     rows, columns, size = int(message.height), int(message.width), int(message.point_step)
     if rows * columns == 0:
         return np.empty((0, 3))
-    data = _bytes(message.data, name)
+    data = as_bytes(message.data, name)
     step = _row_step(message, data, name)
     record = _record(message, name)
     return array_points(np.ndarray((rows, columns), record, data, 0, (step, size)).ravel(), name)
@@ -55,12 +69,19 @@ def _object(message: Any) -> Any:
     return SimpleNamespace(**{"is_bigendian": False, **message, "fields": fields})
 
 
-def _bytes(raw: Any, name: str) -> NDArray[np.uint8]:
+def as_bytes(raw: Any, name: str) -> NDArray[np.uint8]:
+    """The data of a message as numbers; text is base64, as JSON has it.
+
+    Raises
+    ------
+    ValueError
+        Text that is no base64.
+    """
     if isinstance(raw, str):
         try:
             raw = base64.b64decode(raw, validate=True)
         except (binascii.Error, ValueError) as error:
-            problem = f"the data of a PointCloud2 are text, but not base64: {shorten(raw)}"
+            problem = f"the data of a cloud are text, but not base64: {shorten(raw)}"
             raise fault(name, problem, "give them as bytes") from error
     if isinstance(raw, (bytes, bytearray, memoryview)):
         return np.frombuffer(raw, np.uint8)

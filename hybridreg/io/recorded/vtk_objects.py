@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Objects of VTK itself: the points of a vtkPolyData or of vtkPoints."""
+"""Objects of VTK and of pyvista: the points of a data set, or of vtkPoints."""
 
 from __future__ import annotations
 
@@ -11,19 +11,32 @@ from numpy.typing import NDArray
 from hybridreg.runtime.optional_packages import load
 
 Array = NDArray[np.float64]
+_VOLUME = 3  # dimensions
 
 
 def is_vtk(x: Any) -> bool:
-    """Whether an object is a data set with points of VTK, or the points alone; those of pyvista are read as arrays."""
+    """Whether an object is a data set of VTK, several of them, or points alone; pyvista's are too."""
     is_a = getattr(x, "IsA", None)
-    return callable(is_a) and not hasattr(x, "n_cells") and bool(is_a("vtkPointSet") or is_a("vtkPoints"))
+    return callable(is_a) and any(map(is_a, ("vtkDataSet", "vtkCompositeDataSet", "vtkPoints")))
 
 
 def is_cloud(x: Any) -> bool:
-    """Whether it is points without faces: a surface, a grid or a volume is none."""
+    """Whether it is points without faces, or rows of points as a scanner gives them: a surface, a grid with spaces
+    between or a volume is none."""
     if x.IsA("vtkPoints"):
         return True
-    return bool(x.IsA("vtkPolyData")) and not (x.GetNumberOfPolys() or x.GetNumberOfStrips())
+    if x.IsA("vtkPolyData"):
+        return not (x.GetNumberOfPolys() or x.GetNumberOfStrips())
+    if x.IsA("vtkStructuredGrid"):
+        return bool(x.GetDataDimension() < _VOLUME)
+    return bool(x.IsA("vtkPointSet")) and all(
+        x.GetCell(k).GetCellDimension() == 0 for k in _first_of_each_type(x)
+    )
+
+
+def _first_of_each_type(x: Any) -> list[int]:
+    kinds = [x.GetCellType(k) for k in range(x.GetNumberOfCells())]
+    return [kinds.index(kind) for kind in set(kinds)]
 
 
 def vtk_points(x: Any, name: str) -> Array:

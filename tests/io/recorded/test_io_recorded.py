@@ -528,11 +528,11 @@ def test_an_mcap_file_without_clouds_or_cut_off_says_so(tmp_path: Path) -> None:
     with path.open("wb") as file:
         out = writer(file)
         out.start(profile="", library="test")
-        schema = out.register_schema("sensor_msgs/msg/PointCloud2", "ros2msg", b"")
-        channel = out.register_channel("/points", "cdr", schema)
+        schema = out.register_schema("sensor_msgs/msg/Imu", "ros2msg", b"")
+        channel = out.register_channel("/imu", "cdr", schema)
         out.add_message(channel, 0, b"", 0)
         out.finish()
-    with pytest.raises(ValueError, match="holds no clouds, but sensor_msgs/msg/PointCloud2 in cdr"):
+    with pytest.raises(ValueError, match="holds no clouds, but sensor_msgs/msg/Imu in cdr"):
         read_recorded(path, ANY)
     whole = write_foxglove(tmp_path / "b.mcap", [HUNDRED], [np.eye(4)]).read_bytes()
     (tmp_path / "cut.mcap").write_bytes(whole[: len(whole) // 2])
