@@ -21,7 +21,7 @@ from pathlib import Path
 import numpy as np
 import torch
 
-from benchmarks.multiply_adds import count_multiply_adds
+from benchmarks.measuring.multiply_adds import count_multiply_adds
 from hybridreg.learned.cross3dreg.batch import Batch, make_batch
 from hybridreg.learned.cross3dreg.config import NetworkConfig
 from hybridreg.learned.cross3dreg.network import RegistrationNetwork

@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.alternate import real_pairs
+from benchmarks.measuring.alternate import real_pairs
 from hybridreg import Pipeline
 from hybridreg.classical.voxel import VoxelGrid
 from hybridreg.geometry import se3

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import hybridreg as hr
-from benchmarks.alternate import race, real_pairs
+from benchmarks.measuring.alternate import race, real_pairs
 from hybridreg.geometry import se3
 from hybridreg.matches import Correspondences, Overlap
 from hybridreg.runtime.open3d import load_open3d

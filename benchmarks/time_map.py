@@ -19,7 +19,7 @@ from types import FrameType
 from typing import Any
 
 import hybridreg as hr
-from benchmarks.alternate import real_pairs
+from benchmarks.measuring.alternate import real_pairs
 from hybridreg.data import open_dataset
 from hybridreg.pair import Pair
 

@@ -14,7 +14,7 @@ import argparse
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.alternate import race, real_pairs
+from benchmarks.measuring.alternate import race, real_pairs
 from hybridreg.geometry.voxel_cells import voxel_centroids
 from hybridreg.resolution import default_voxel
 from hybridreg.runtime.open3d import load_open3d

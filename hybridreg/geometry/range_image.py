@@ -16,9 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from hybridreg.geometry.distinct_keys import distinct_keys
 from hybridreg.geometry.extent import radii
 from hybridreg.geometry.extent import reach as reach_of
+from hybridreg.geometry.voxel_cells import distinct_keys
 from hybridreg.runtime.cores import query_threads
 
 Array = NDArray[np.float64]

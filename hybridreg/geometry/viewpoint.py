@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from hybridreg.geometry import ground
-from hybridreg.geometry.distinct_keys import distinct_keys
 from hybridreg.geometry.extent import radii, reach
+from hybridreg.geometry.voxel_cells import distinct_keys
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]

@@ -82,6 +82,15 @@ def voxel_cells(points: Array, voxel: float) -> Cells:
     return Cells(np.ascontiguousarray(whole.sums.T) / whole.counts[:, None], whole.first)
 
 
+def distinct_keys(keys: Integers) -> Integers:
+    """The different ones among keys (n,), rising: sorted, as `np.unique` of numpy 2.3 and later hashes them first and
+    takes ten times as long."""
+    rising = np.sort(keys)
+    first = np.ones(len(rising), dtype=np.bool_)
+    first[1:] = rising[1:] != rising[:-1]
+    return rising[first]
+
+
 def _corners(points: Array) -> tuple[Array, Array]:
     lots = (np.ascontiguousarray(points[start : start + _LOT].T) for start in range(0, len(points), _LOT))
     low, high = zip(*((rows.min(axis=1), rows.max(axis=1)) for rows in lots), strict=True)

@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from hybridreg.geometry.distinct_keys import distinct_keys
+from hybridreg.geometry.voxel_cells import distinct_keys
 
 Array = NDArray[np.float64]
 

@@ -11,7 +11,7 @@ import torch
 from four_pairs import four_pairs
 from measured import peak_and_estimate
 
-from benchmarks.multiply_adds import count_multiply_adds
+from benchmarks.measuring.multiply_adds import count_multiply_adds
 from hybridreg.learned import memory_estimate
 from hybridreg.learned.cofinet.network import CofinetNetwork
 from hybridreg.learned.predator.network import PredatorNetwork
