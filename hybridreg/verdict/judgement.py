@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from hybridreg.evidence import match_agreement
+from hybridreg.evidence import lone_thing, match_agreement
 from hybridreg.evidence.agreement import Agreement, OneWay
 from hybridreg.evidence.covariance import of_information
 from hybridreg.evidence.evidence import NO_RIVAL, Evidence, share
@@ -124,6 +124,7 @@ def judge(scene: Scene, pose: Pose, matches: Correspondences) -> Judgement:
         explained=bool(scene.explanations),
         started=scene.pair.placed is not None,
         through_walls=_through_walls(scene, evidence),
+        lone_thing=DOUBTED >= weighed.confidence > FAILED and _is_lone_thing(scene, weighed.at),
         slack=weighed.slack,
         drawn=weighed.drawn,
     )
@@ -169,7 +170,12 @@ def _believed(
     probability = confidence(evidence)
     if slack or _through_walls(scene, evidence) or _looks_alike(scene, at, found):
         return min(probability, DOUBTED)
-    return probability
+    return min(probability, DOUBTED) if probability > DOUBTED and _is_lone_thing(scene, at) else probability
+
+
+def _is_lone_thing(scene: Scene, at: PoseEvidence) -> bool:
+    opposite = lone_thing.opposite(scene, at)
+    return opposite is not None and scene.pair.allows(opposite)
 
 
 def _alone(scene: Scene, at: PoseEvidence, found_by: int = 1) -> Hypothesis:

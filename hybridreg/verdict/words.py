@@ -36,13 +36,15 @@ def reasons(
     explained: bool = False,
     started: bool = False,
     through_walls: bool = False,
+    lone_thing: bool = False,
     slack: Tolerance | None = None,
     drawn: Tolerance | None = None,
 ) -> tuple[str, ...]:
     """Why the verdict is what it is; never empty. `unseen` says why the viewpoint of a cloud is unknown.
 
     `explained`: a sentence before these says why no pose was found; `started`: the search began at a given start;
-    `through_walls`: more of the walls of flat scans is seen through than at any right pose; `slack`: degrees and metres
+    `through_walls`: more of the walls of flat scans is seen through than at any right pose; `lone_thing`: one thing is
+    seen from one side; `slack`: degrees and metres
     by which a right pose may well be off, where that is more than the tolerance; `drawn`: those by which the surfaces
     draw it to where they fit better.
     """
@@ -54,6 +56,7 @@ def reasons(
     against = (
         *_elsewhere(drawn),
         *_against(evidence, agreement, held, through_walls),
+        *_from_one_side(lone_thing),
         *_inexact(slack),
         *_unknown(unseen),
     )
@@ -114,6 +117,15 @@ def _elsewhere(drawn: Tolerance | None) -> Iterator[str]:
         yield (
             f"the surfaces draw the pose {drawn.degrees:.1f} deg and {drawn.metres:.2g} m away, where they fit better; "
             'if it was not refined, refine it: pipeline.swap(refine="gicp") (--set refine=gicp)'
+        )
+
+
+def _from_one_side(lone_thing: bool) -> Iterator[str]:
+    if lone_thing:
+        yield (
+            "one thing stands alone on flat ground, and by this pose both sensors look at the same side of it; from "
+            "behind it may look alike. A rough start excludes that: init=T, max_rotation=90 (--init POSE "
+            "--max-rotation 90)"
         )
 
 
