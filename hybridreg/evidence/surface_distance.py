@@ -123,8 +123,8 @@ def closeness(fine: FineSurfaces, T_target_source: Array) -> float:
     source, target = fine
     back: Array = np.linalg.inv(T_target_source).astype(np.float64)  # of a pose with a size too
     return max(
-        _one_way(source.asked, target, T_target_source),
-        _one_way(target.asked, source, back),
+        one_way(source.asked, target, T_target_source),
+        one_way(target.asked, source, back),
     )
 
 
@@ -154,7 +154,8 @@ def _surfaces(cloud: PointCloud, scale: float) -> Surfaces:
     )
 
 
-def _one_way(asked: Array, other: Surfaces, T_other_asked: Array) -> float:
+def one_way(asked: Array, other: Surfaces, T_other_asked: Array) -> float:
+    """The same of points (m, 3) of one cloud on the surfaces of the other."""
     far, noise = other.far, other.noise
     moved = se3.apply(T_other_asked, asked)
     distance, match = other.tree.query(moved, distance_upper_bound=far)

@@ -25,7 +25,7 @@ from hybridreg.scene import Scene
 from hybridreg.search import rivals, settle
 from hybridreg.search.hypothesis import Hypothesis, of_pose
 from hybridreg.search.ranking import best, differs, told_apart
-from hybridreg.verdict.confidence import CLEAR, DOUBTED, LIKELY, Word, confidence, word
+from hybridreg.verdict.confidence import CLEAR, DOUBTED, LIKELY, SIZE_GAIN, Word, confidence, word
 from hybridreg.verdict.words import reasons
 
 Array = NDArray[np.float64]
@@ -168,9 +168,18 @@ def _believed(
 ) -> float:
     # The probability by the trees, bounded by what they do not see.
     probability = confidence(evidence)
+    if probability < FAILED and _is_right_but_for_size(scene, at, evidence):
+        probability = FAILED
     if slack or _through_walls(scene, evidence) or _looks_alike(scene, at, found):
         return min(probability, DOUBTED)
     return min(probability, DOUBTED) if probability > DOUBTED and _is_lone_thing(scene, at) else probability
+
+
+def _is_right_but_for_size(scene: Scene, at: PoseEvidence, evidence: Evidence) -> bool:
+    # A source that is a per cent too large does not lie closely, but where it lies is right nearby.
+    allowed = tolerance(scene.pair.source, scene.pair.target)
+    resized = evidence.size_gain > SIZE_GAIN and at.size.off.within(allowed)
+    return resized and confidence(replace(evidence, size_gain=0.0)) >= FAILED
 
 
 def _is_lone_thing(scene: Scene, at: PoseEvidence) -> bool:

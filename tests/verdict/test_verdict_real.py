@@ -16,6 +16,7 @@ from hybridreg.evidence import views
 from hybridreg.geometry import se3
 from hybridreg.matches import Correspondences, Pose
 from hybridreg.pair import Pair
+from hybridreg.resolution import VEHICLES, Tolerance
 from hybridreg.scene import Scene
 from hybridreg.search.settle import settle
 from hybridreg.verdict import judge
@@ -126,3 +127,33 @@ def test_a_map_that_holds_the_place_twice_shows_both(
     for right in (truth, copy @ truth):
         off = [right @ se3.inverse(T) for T in (result.transformation, *result.rivals)]
         assert any(se3.angle_deg(M[:3, :3]) < 1.0 and np.linalg.norm(M[:3, 3]) < 0.5 for M in off)
+
+
+@pytest.mark.parametrize("within", [8.0, 12.0])
+def test_a_range_offset_between_sensors_is_not_taken_for_another_size(real_data: Path, within: float) -> None:
+    """One sensor of this pair measures 10 cm too short; in a crop, that looked like a size, and right poses failed."""
+    name = "rellis-vlp32-to-os64"
+    if not (real_data / name).is_dir():
+        pytest.skip(f"no pair {name}")
+    source, target = (
+        np.load(real_data / name / f"{side}.npz")["xyz"].astype(float) for side in ("source", "target")
+    )
+    source, target = (cloud[np.linalg.norm(cloud[:, :2], axis=1) < within] for cloud in (source, target))
+    result = hr.register(source, target)
+    off = Tolerance.between(truth_of(real_data, name), result.transformation, target.mean(axis=0))
+    assert off.within(VEHICLES)
+    assert result.verdict != "failed"
+    assert result.evidence["size_gain"] == 0.0
+
+
+@pytest.mark.parametrize("factor", [0.98, 0.985])
+def test_a_right_pose_of_a_source_a_per_cent_too_small_is_doubtful(real_data: Path, factor: float) -> None:
+    name = "kitti-city-20-to-0"
+    if not (real_data / name).is_dir():
+        pytest.skip(f"no pair {name}")
+    source, target = (
+        np.load(real_data / name / f"{side}.npz")["xyz"].astype(float) for side in ("source", "target")
+    )
+    result = hr.register(factor * source, target)
+    assert result.verdict == "doubtful"
+    assert f"multiplied by {1.0 / factor:.2f}" in " ".join(result.reasons)
