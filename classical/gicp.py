@@ -21,6 +21,7 @@ from hybridreg.stage import Stage
 Array = NDArray[np.float64]
 
 _FEWEST_NEIGHBOURS = 3  # span a plane
+_FEWEST = 11  # source points near the target: with fewer small_gicp (1.0.1) writes warnings to the terminal
 # Steps at which a round has converged.
 _STILL_RAD = 1e-5  # radians, by hand
 _STILL_M = 1e-4  # metres, by hand
@@ -67,7 +68,7 @@ class Gicp(Stage):
         distances = self.max_distances or (5 * scene.spacing, 2.5 * scene.spacing, 1.25 * scene.spacing)
         T = pose.T
         near = _within(scene, T, voxel, _FAR * max(distances))
-        if len(near) < _FEWEST_NEIGHBOURS:
+        if len(near) < _FEWEST:
             return pose
         source, _ = _surfaces(near, self.neighbours)
         level = scene.at(voxel).target

@@ -42,11 +42,10 @@ def near_copies(views: Views, T_target_source: Array, axes: Array, allowed: Tole
     if points.tell_nothing:
         return []
     reach = int(np.ceil(_REACH * views.spacing / cell))
-    middle = se3.apply(T_target_source, views.middle)
+    middle = se3.apply(T_target_source, views.middle)[0]
 
     def apart(M: Array) -> bool:
-        moved = float(np.linalg.norm(se3.apply(M, middle) - middle))
-        return not Tolerance(se3.angle_deg(M[:3, :3]), moved).within(allowed)
+        return not Tolerance.between(np.eye(4), M, middle).within(allowed)
 
     guesses = [M for M in (*_shifted(points, reach), *_raised(points, reach)) if apart(M)][:_MOST]
     if not guesses:

@@ -35,8 +35,8 @@ SPARSE, _AGREE = 1000, 20
 # another size, the ground's relief may still agree, and nothing else does.
 _THROUGH = 20
 # Log-odds by which the best rival must lie behind for an "ok": its own are no surer than the pose's. By hand: of made
-# halls, racks, tunnels and pipes that repeat exactly, six wrong poses led by 3.7 to 4.4; of 68 pairs of `sim:val` and of
-# hard kinds with even seeds two right ones lead by 3.5 to 4.5.
+# halls, racks, tunnels and pipes that repeat exactly, six wrong poses led by 3.7 to 4.4; of 68 pairs of `sim:val` and
+# hard kinds with even seeds, two right ones lead by 3.5 to 4.5.
 CLEAR = 4.5
 # Log-odds by which a rival may be likelier and still count as equal; by hand.
 _EQUAL = 1.0

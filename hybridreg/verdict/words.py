@@ -101,7 +101,7 @@ def _against(
     elif evidence.support + margin > LIKELY:
         yield (
             f"another pose is likely by itself (its support is lower by {-margin:.2f}; see rivals): "
-            "does a cloud hold a place twice?"
+            "does the place repeat, or does a cloud hold it twice?"
         )
     if held.weakest < WEAK:
         yield f"the pose is poorly constrained {held.words}: {held.weakest:.1%} of the surfaces' information"
