@@ -8,9 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from hybridreg.evidence import lone_thing, match_agreement
+from hybridreg.evidence import match_agreement
 from hybridreg.evidence.agreement import Agreement, OneWay
-from hybridreg.evidence.covariance import of_information
 from hybridreg.evidence.evidence import NO_RIVAL, Evidence, share
 from hybridreg.evidence.log_odds import FAILED, OK, OK_LOG_ODDS, log_odds
 from hybridreg.evidence.pose_evidence import PoseEvidence
@@ -18,14 +17,14 @@ from hybridreg.evidence.scale import Size
 from hybridreg.evidence.views import View
 from hybridreg.geometry import se3
 from hybridreg.geometry.fitness import Overlay
-from hybridreg.geometry.ground_relief import TELLS
 from hybridreg.matches import Correspondences, Pose
 from hybridreg.resolution import Tolerance, tolerance
 from hybridreg.scene import Scene
 from hybridreg.search import rivals, settle
 from hybridreg.search.hypothesis import Hypothesis, of_pose
 from hybridreg.search.ranking import best, differs, told_apart
-from hybridreg.verdict.confidence import CLEAR, DOUBTED, LIKELY, SIZE_GAIN, Word, confidence, word
+from hybridreg.verdict import bounds
+from hybridreg.verdict.confidence import CLEAR, DOUBTED, LIKELY, Word, confidence, word
 from hybridreg.verdict.words import reasons
 
 Array = NDArray[np.float64]
@@ -33,16 +32,6 @@ Array = NDArray[np.float64]
 
 # Nats per point by which a size must be better than those 1.5 % beside it: by hand; 0.09 to 2 on four pairs.
 _LEAST_MARGIN = 0.05
-
-# Share of the walls drawn through flat scans that may be seen through: of 59 right poses on training pairs none has
-# more than 0.03, of the wrong ones that are likely otherwise none less than 0.05.
-_THROUGH_WALLS = 0.04
-# Log-odds from which a rival may be right though it is far behind, where nothing shows which way is up, or walls are
-# all there is: of a box that was seen from two sides, a wrong turn lays one side upon the other, and more agrees than
-# at the true pose. Of 795 right training poses 27 have such a rival; by hand.
-_ALIKE = 2.0
-# Standard deviations within which 95 % of a normal distribution lie.
-_MOST_LIKELY = 1.96
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -123,8 +112,8 @@ def judge(scene: Scene, pose: Pose, matches: Correspondences) -> Judgement:
         unseen=_unseen(scene),
         explained=bool(scene.explanations),
         started=scene.pair.placed is not None,
-        through_walls=_through_walls(scene, evidence),
-        lone_thing=DOUBTED >= weighed.confidence > FAILED and _is_lone_thing(scene, weighed.at),
+        through_walls=bounds.through_walls(scene, evidence),
+        lone_thing=DOUBTED >= weighed.confidence > FAILED and bounds.is_lone_thing(scene, weighed.at),
         slack=weighed.slack,
         drawn=weighed.drawn,
     )
@@ -154,7 +143,7 @@ def weigh(scene: Scene, pose: Pose) -> Weighed:
     own, *found = told_apart([own, *(one for one in offered if scene.pair.allows(one.T))])
     found = best(found)
     evidence = evidence_of(own, found, at.size if pose.found else Size())
-    slack = _slack(scene, at)
+    slack = bounds.slack(scene, at)
     probability = _believed(scene, at, found, evidence, slack)
     drawn = None
     if pose.found and not FAILED <= probability <= DOUBTED and not evidence.overturned:
@@ -168,48 +157,20 @@ def _believed(
 ) -> float:
     # The probability by the trees, bounded by what they do not see.
     probability = confidence(evidence)
-    if probability < FAILED and _is_right_but_for_size(scene, at, evidence):
+    if probability < FAILED and bounds.is_right_but_for_size(scene, at, evidence):
         probability = FAILED
-    if slack or _through_walls(scene, evidence) or _looks_alike(scene, at, found):
+    if slack or bounds.through_walls(scene, evidence) or bounds.looks_alike(scene, at, found):
         return min(probability, DOUBTED)
-    return min(probability, DOUBTED) if probability > DOUBTED and _is_lone_thing(scene, at) else probability
-
-
-def _is_right_but_for_size(scene: Scene, at: PoseEvidence, evidence: Evidence) -> bool:
-    # A source that is a per cent too large does not lie closely, but where it lies is right nearby.
-    allowed = tolerance(scene.pair.source, scene.pair.target)
-    resized = evidence.size_gain > SIZE_GAIN and at.size.off.within(allowed)
-    return resized and confidence(replace(evidence, size_gain=0.0)) >= FAILED
-
-
-def _is_lone_thing(scene: Scene, at: PoseEvidence) -> bool:
-    opposite = lone_thing.opposite(scene, at)
-    return opposite is not None and scene.pair.allows(opposite)
+    return (
+        min(probability, DOUBTED)
+        if probability > DOUBTED and bounds.is_lone_thing(scene, at)
+        else probability
+    )
 
 
 def _alone(scene: Scene, at: PoseEvidence, found_by: int = 1) -> Hypothesis:
     matched = match_agreement.share(scene, at.T)
     return Hypothesis(at=at, by_surfaces=at.by_surfaces, found_by=found_by, matched=matched)
-
-
-def _looks_alike(scene: Scene, at: PoseEvidence, found: list[Hypothesis]) -> bool:
-    return (scene.pair.drawn or at.views.up is None) and any(one.by_surfaces > _ALIKE for one in found)
-
-
-def _through_walls(scene: Scene, evidence: Evidence) -> bool:
-    return scene.pair.drawn and evidence.looked_through_rare > _THROUGH_WALLS
-
-
-def _slack(scene: Scene, at: PoseEvidence) -> Tolerance | None:
-    # Degrees and metres by which a right pose may well be off, where more than the tolerance; what relief adds is left
-    # out of the covariance.
-    if at.agreement.relief.information > TELLS:
-        return None
-    allowed = tolerance(scene.pair.source, scene.pair.target)
-    C = of_information(at.information.matrix, allowed)
-    turn, shift = (_MOST_LIKELY * _worst(part) for part in (C[:3, :3], C[3:, 3:]))
-    off = Tolerance(float(np.degrees(turn)), shift)
-    return None if off.within(allowed) else off
 
 
 def _drawn(scene: Scene, at: PoseEvidence, found: list[Hypothesis], *, ok: bool) -> Tolerance | None:
@@ -235,14 +196,7 @@ def _is_ok(scene: Scene, at: PoseEvidence, found: list[Hypothesis]) -> bool:
     apart = [one.but(closeness=0.0) for one in found if differs(one.T, at.T, centre, spacing)]
     own, *others = told_apart([_alone(scene, at), *apart])
     evidence = evidence_of(own, best(others), at.size)
-    return _believed(scene, at, others, evidence, _slack(scene, at)) >= OK
-
-
-def _worst(covariance: Array) -> float:
-    # Standard deviation along the direction of the largest.
-    if not np.isfinite(covariance).all():
-        return np.inf
-    return float(np.sqrt(np.linalg.eigvalsh(covariance)[-1]))
+    return _believed(scene, at, others, evidence, bounds.slack(scene, at)) >= OK
 
 
 def evidence_of(own: Hypothesis, found: list[Hypothesis], size: Size) -> Evidence:
