@@ -29,6 +29,8 @@ _POINTS = 120
 _SHARE = 0.5
 # Guesses that are settled, at most; by hand.
 _MOST = 4
+# Times that each is settled: a guess is half a cell and half a degree off; by hand.
+_ROUNDS = 2
 # Nats per point by which the clouds must lie less closely on one another half-way between two copies than at either: by
 # hand. Of maps that hold every wall twice it is 0.3 to 0.9, of poses that surfaces hold loosely less than zero.
 _VALLEY = 0.15
@@ -50,7 +52,9 @@ def near_copies(views: Views, T_target_source: Array, axes: Array, allowed: Tole
     guesses = [M for M in (*_shifted(points, reach), *_raised(points, reach)) if apart(M)][:_MOST]
     if not guesses:
         return []
-    settled = settle_closely(views.fine, np.array([M @ T_target_source for M in guesses]))
+    settled = np.array([M @ T_target_source for M in guesses])
+    for _ in range(_ROUNDS):
+        settled = settle_closely(views.fine, settled)
     return [T for T in settled if apart(T @ se3.inverse(T_target_source))]
 
 

@@ -31,7 +31,7 @@ _ENOUGH = 4
 # Log-odds below the pose's from which a rival is none to speak of: by hand.
 _CONTENDS = 6.0
 # The same for a copy just beside the pose: of maps that hold every wall twice it lies at most 2.3 below; by hand.
-_COPIED = 3.0
+_COPIED = 3.5
 # Cosine of the angle by which a turn may tilt the ground: by hand.
 _UPRIGHT = 0.9
 # Strides over the sampled points: for a guess's promise, and once it is settled.
