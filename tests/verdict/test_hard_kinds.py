@@ -72,7 +72,7 @@ def test_where_gravity_is_unknown_nothing_is_turned_over(crossing: Made) -> None
 def test_a_source_of_another_size_is_never_ok_and_its_size_is_told(crossing: Made, factor: float) -> None:
     scene = VoxelGrid()(changed(crossing, factor))
     pose = Pose(about_middle(crossing, factor))
-    scale, gain = PoseEvidence(views.of(scene), pose.T).size
+    scale, gain, _ = PoseEvidence(views.of(scene), pose.T).size
     assert scale == pytest.approx(1.0 / factor, abs=0.01)
     assert gain > 0.2
     judgement = judge(scene, pose, NONE)
