@@ -20,12 +20,14 @@ Array = NDArray[np.float64]
 
 # Edge of a cell, of the spacing or of the tolerance, whichever is less, and the farthest shift, spacings; by hand.
 _CELL, _REACH = 0.5, 3.5
+# Cells of the farthest shift, at most: for speed.
+_FARTHEST = 16
 # Turns tried with each shift, degrees; by hand.
 _TURNS_DEG = tuple(np.arange(-5.0, 6.0))
 # Points of each kind that are moved: for speed.
 _POINTS = 120
-# Share of the points that coincide at the pose which must coincide beside it; by hand. Beside true poses without a copy
-# no other peak has as many; beside copies that overlap there are many, of which the fullest count.
+# Share of the points that coincide at the pose which must coincide beside it: by hand; of a map that holds every wall
+# twice 0.7 to 1.1.
 _SHARE = 0.5
 # Guesses that are settled, at most; by hand.
 _MOST = 4
@@ -43,7 +45,7 @@ def near_copies(views: Views, T_target_source: Array, axes: Array, allowed: Tole
     points = MovedPoints(views, T_target_source, axes, cell, _POINTS, wide=True)
     if points.tell_nothing:
         return []
-    reach = int(np.ceil(_REACH * views.spacing / cell))
+    reach = min(int(np.ceil(_REACH * views.spacing / cell)), _FARTHEST)
     middle = se3.apply(T_target_source, views.middle)[0]
 
     def apart(M: Array) -> bool:
