@@ -55,8 +55,9 @@ for name, larger in (
     found[name] = (length, share)
     print(f"{name}: normals of length {length:.2f}; {share:.0%} of the points find themselves by FPFH")
 
-assert abs(found["scale"][0] - 1.0) < 1e-6 and found["scale"][1] > 0.9
-assert abs(found["transform"][0] - FACTOR) < 1e-6 and found["transform"][1] < 0.1
-assert abs(found["transform, then normalize_normals"][0] - 1.0) < 1e-6
-assert found["transform, then normalize_normals"][1] > 0.9
+same = "open3d no longer does this"
+assert abs(found["scale"][0] - 1.0) < 1e-6 and found["scale"][1] > 0.9, same
+assert abs(found["transform"][0] - FACTOR) < 1e-6 and found["transform"][1] < 0.1, same
+cured = found["transform, then normalize_normals"]
+assert abs(cured[0] - 1.0) < 1e-6 and cured[1] > 0.9, same
 PYTHON
