@@ -85,9 +85,9 @@ def _shifted(points: MovedPoints, reach: int) -> list[Array]:
 
 
 def _raised(points: MovedPoints, reach: int) -> list[Array]:
-    # Away from the commonest surface: what faces the others meets there anyway.
+    # Away from the commonest surface, whose points alone count: what faces the others meets there anyway.
     frame, middle = points.axes[[1, 0, 2]], points.things.mean(axis=0)
-    share = points.share((0, 1, 2), frame, middle, [np.eye(3)], (0, reach))
+    share = points.share((0,), frame, middle, [np.eye(3)], (0, reach))
     return [se3.from_rt(np.eye(3), points.cell * (j - reach) * points.axes[0]) for _, _, j in _peaks(share)]
 
 
