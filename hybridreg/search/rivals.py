@@ -61,12 +61,11 @@ def find(scene: Scene, own: Hypothesis, pose: Pose) -> list[Hypothesis]:
         # Where surfaces hold a pose loosely, a rival may have stopped on its way to it.
         return one.log_odds < own.log_odds - _CONTENDS or is_rival(settle_closely(views.fine, one.T))
 
-    beside = [one for one in _beside(scene, own) if not is_rival(one.T)]
-    return [*(one for one in apart if came_to_rest(one)), *beside]
+    return distinct(scene, [*(one for one in apart if came_to_rest(one)), *_beside(scene, own)])
 
 
 def _beside(scene: Scene, own: Hypothesis) -> list[Hypothesis]:
-    # The likeliest copy of the place that is nearer than a rival, if any contends.
+    # The likeliest copy of the place just beside the pose, if any contends.
     if own.log_odds < -_CONTENDS:
         return []
     views, allowed = own.at.views, tolerance(scene.pair.source, scene.pair.target)
