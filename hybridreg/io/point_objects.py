@@ -214,7 +214,7 @@ def _as_array(x: Any, name: str) -> NDArray[Any]:
         cure = "bytes have no type; of a file pass the path, of numbers numpy.frombuffer(x, dtype).reshape(-1, 3)"
         _refuse(x, name, cure)
     if isinstance(x, io.IOBase):
-        _refuse(x, name, "pass the path of the file")
+        _refuse(x, name, "pass the path of the file; bytes in memory must be written to one first")
     array = np.ma.asarray(x) if np.ma.isMaskedArray(x) else np.asarray(x)
     if isinstance(x, (list, tuple)) and any(np.ma.isMaskedArray(each) for each in x):
         # numpy leaves the masks out
