@@ -51,7 +51,7 @@ def opposite(scene: Scene, at: PoseEvidence) -> Array | None:
         things.append(thing)
     centre, up = things[1]
     places = se3.apply(at.T, at.views.source.centre[None])[0], at.views.target.centre
-    a, b = ((place - centre) - ((place - centre) @ up) * up for place in places)
+    a, b = (_level(place - centre, up) for place in places)
     if float(a @ b) < np.cos(np.radians(_ONE_SIDE_DEG)) * float(np.linalg.norm(a) * np.linalg.norm(b)):
         return None
     turned: Array = se3.about(centre, se3.rotation_about(np.pi * up)) @ at.T
@@ -65,7 +65,7 @@ def _thing(view: View, ground: Ground) -> _Thing | None:
     points, up = view.points[off], ground.up
     centre = np.median(points, axis=0)
     extent = np.percentile(np.linalg.norm(points - centre, axis=1), _MOST)
-    ahead = (centre - view.centre) - ((centre - view.centre) @ up) * up
+    ahead = _level(centre - view.centre, up)
     far = float(np.linalg.norm(ahead))
     if far < _FAR * extent:
         return None
@@ -76,3 +76,8 @@ def _thing(view: View, ground: Ground) -> _Thing | None:
         return float(np.percentile(np.abs(np.arctan2(rays @ aside, rays @ ahead)), _MOST))
 
     return _Thing(centre, up) if filled(points) < _NARROW * filled(view.points[~off]) else None
+
+
+def _level(vector: Array, up: Array) -> Array:
+    level: Array = vector - (vector @ up) * up
+    return level

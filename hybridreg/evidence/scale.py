@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from hybridreg.evidence.surface_distance import closeness, one_way
+from hybridreg.evidence.surface_distance import Surfaces, closeness, one_way
 from hybridreg.evidence.views import Views
 from hybridreg.geometry import se3
 from hybridreg.geometry.point_to_plane import descend
@@ -67,11 +67,10 @@ def _is_range_offset(views: Views, T: Array, fitted: Array) -> bool:
         return False
     rays = source.asked - views.source.centre
     ranges = np.maximum(np.linalg.norm(rays, axis=1, keepdims=True), target.far)
-    steps = [_step(part * target.far, target.noise) for part in _CLOSELY]
 
     def gained(offset: float) -> float:
         moved = source.asked + offset * rays / ranges
-        return one_way(moved, target, descend(T, moved[:_POINTS], target, steps))
+        return one_way(moved, target, descend(T, moved[:_POINTS], target, _close_steps(target)))
 
     return max(map(gained, _OFFSETS)) >= one_way(source.asked, target, fitted)
 
@@ -82,8 +81,11 @@ def _fitted(views: Views, T: Array) -> Array:
     roughly = [_step(reach * spacing, spacing) for reach in _ROUGHLY]
     M = descend(T, points, views.target, roughly, sized=True)
     fine, surfaces = views.fine
-    steps = [_step(part * surfaces.far, surfaces.noise) for part in _CLOSELY]
-    return descend(M, fine.asked[:_POINTS], surfaces, steps, sized=True)
+    return descend(M, fine.asked[:_POINTS], surfaces, _close_steps(surfaces), sized=True)
+
+
+def _close_steps(surfaces: Surfaces) -> list[tuple[float, float]]:
+    return [_step(part * surfaces.far, surfaces.noise) for part in _CLOSELY]
 
 
 def _step(reach: float, noise: float) -> tuple[float, float]:

@@ -94,3 +94,12 @@ class MovedPoints:
             return points
         corners = 0.5 * self.cell * np.array(list(product((-1.0, 1.0), repeat=3)))
         return (points[:, None] + corners).reshape(-1, 3)
+
+
+def peaks(share: Array, sizes: int | tuple[int, ...], least: float) -> list[tuple[int, ...]]:
+    """Where no less coincides than in the window of those sizes around, and `least` at the least, the fullest first."""
+    from scipy.ndimage import maximum_filter
+
+    peak = np.argwhere((share == maximum_filter(share, sizes, mode="constant")) & (share >= least))
+    order = np.argsort(-share[tuple(peak.T)], kind="stable")
+    return [tuple(row) for row in peak[order].tolist()]

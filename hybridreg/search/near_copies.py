@@ -14,7 +14,7 @@ from hybridreg.evidence.surface_distance import closeness, settle_closely
 from hybridreg.evidence.views import Views
 from hybridreg.geometry import se3
 from hybridreg.resolution import Tolerance
-from hybridreg.search.moved_points import MovedPoints
+from hybridreg.search.moved_points import MovedPoints, peaks
 
 Array = NDArray[np.float64]
 
@@ -29,6 +29,8 @@ _POINTS = 120
 # Share of the points that coincide at the pose which must coincide beside it: by hand; of a map that holds every wall
 # twice 0.7 to 1.1.
 _SHARE = 0.5
+# Turns and cells of either axis within which there is one peak; by hand.
+_WINDOW = (3, 5, 5)
 # Guesses that are settled, at most; by hand.
 _MOST = 4
 # Times that each is settled: a guess is half a cell and half a degree off; by hand.
@@ -80,7 +82,7 @@ def _shifted(points: MovedPoints, reach: int) -> list[Array]:
     share = points.share((1, 2), frame, middle, turns, (reach, reach))
     return [
         se3.about(middle, turns[turn], points.cell * np.array([i - reach, j - reach, 0]) @ frame)
-        for turn, i, j in _peaks(share)
+        for turn, i, j in peaks(share, _WINDOW, _SHARE)
     ]
 
 
@@ -88,13 +90,7 @@ def _raised(points: MovedPoints, reach: int) -> list[Array]:
     # Away from the commonest surface, whose points alone count: what faces the others meets there anyway.
     frame, middle = points.axes[[1, 0, 2]], points.things.mean(axis=0)
     share = points.share((0,), frame, middle, [np.eye(3)], (0, reach))
-    return [se3.from_rt(np.eye(3), points.cell * (j - reach) * points.axes[0]) for _, _, j in _peaks(share)]
-
-
-def _peaks(share: Array) -> list[tuple[int, int, int]]:
-    # Where no less coincides than around, the fullest first.
-    from scipy.ndimage import maximum_filter
-
-    peak = np.argwhere((share == maximum_filter(share, (3, 5, 5), mode="constant")) & (share >= _SHARE))
-    order = np.argsort(-share[tuple(peak.T)], kind="stable")
-    return [(int(a), int(i), int(j)) for a, i, j in peak[order]]
+    return [
+        se3.from_rt(np.eye(3), points.cell * (j - reach) * points.axes[0])
+        for _, _, j in peaks(share, _WINDOW, _SHARE)
+    ]

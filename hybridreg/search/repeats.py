@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from hybridreg.evidence.views import Views
 from hybridreg.geometry import se3
-from hybridreg.search.moved_points import CHANCE, MovedPoints
+from hybridreg.search.moved_points import CHANCE, MovedPoints, peaks
 from hybridreg.search.occupied_cells import OccupiedCells
 
 Array = NDArray[np.float64]
@@ -100,12 +100,11 @@ def _apart(places: Sequence[Array], least: float) -> list[Array]:
 
 
 def _peaks(share: Array, *, centre: bool = True) -> list[tuple[int, int]]:
-    # Where no less coincides than around, the best first; without the pose itself, where it is at the centre.
-    from scipy.ndimage import maximum_filter
-
-    peak = (share == maximum_filter(share, 2 * _APART + 1, mode="constant")) & (share >= _SHARE)
-    if centre:
-        peak[tuple(slice(max(n // 2 - _APART, 0), n // 2 + _APART + 1) for n in share.shape)] = False
-    rows, columns = np.nonzero(peak)
-    order = np.argsort(-share[rows, columns], kind="stable")[:_MOST]
-    return list(zip(rows[order].tolist(), columns[order].tolist(), strict=True))
+    # The fullest; without the pose itself, where it is at the centre.
+    middle = np.array(share.shape) // 2
+    found = [
+        (i, j)
+        for i, j in peaks(share, 2 * _APART + 1, _SHARE)
+        if not centre or max(abs(i - middle[0]), abs(j - middle[1])) > _APART
+    ]
+    return found[:_MOST]

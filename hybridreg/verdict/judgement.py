@@ -161,11 +161,9 @@ def _believed(
         probability = FAILED
     if slack or bounds.through_walls(scene, evidence) or bounds.looks_alike(scene, at, found):
         return min(probability, DOUBTED)
-    return (
-        min(probability, DOUBTED)
-        if probability > DOUBTED and bounds.is_lone_thing(scene, at)
-        else probability
-    )
+    if probability > DOUBTED and bounds.is_lone_thing(scene, at):
+        return DOUBTED
+    return probability
 
 
 def _alone(scene: Scene, at: PoseEvidence, found_by: int = 1) -> Hypothesis:

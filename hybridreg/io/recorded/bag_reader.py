@@ -25,7 +25,6 @@ from hybridreg.io.recorded.recording import (
 from hybridreg.runtime.optional_packages import load
 
 Array = NDArray[np.float64]
-_NANOSECONDS = 1e9
 # What may mend a recording that was cut off, by the ending of its file.
 _CURES = {
     ".bag": "if its recording was cut off, run `rosbag reindex` on it",
@@ -63,19 +62,14 @@ def read_bag(path: Path, selection: Selection) -> Recorded:
     try:
         connections = _of_topic(reader, selection.topic, name)
         if selection.at is not None:
-            start = reader.start_time + int(selection.at * _NANOSECONDS)
-            messages = reader.messages(connections=connections, start=start)
+            messages = reader.messages(connections=connections, start=selection.begin(reader.start_time))
             first = 0
         else:
             first = selection.first_of(sum(c.msgcount for c in connections), name, "clouds of this topic")
             messages = reader.messages(connections=connections)
         with foreign_parser(name, "a ROS bag"):
             chosen = list(islice(messages, first, first + selection.accumulate))
-        if len(chosen) < selection.accumulate:
-            length = (reader.end_time - reader.start_time) / _NANOSECONDS
-            problem = f"holds {len(chosen)} clouds of this topic from {selection.at or 0:g} s on"
-            cure = f"it lasts {length:.1f} s, choose an earlier time"
-            raise fault(name, f"{problem}, {selection.accumulate} were asked for", cure)
+        selection.check_enough(len(chosen), reader.start_time, reader.end_time, name)
         points = np.vstack(list(_clouds(reader, chosen, name)))
         return check_filled(Recorded(points, holed=True), name)
     finally:

@@ -35,7 +35,6 @@ _KINDS = (
 )
 _CURE = f"clouds are foxglove.PointCloud in protobuf or JSON, and as ROS writes them {CLOUDS_OF_ROS}"
 _MAGIC, _HEADER, _LENGTH = b"\x89MCAP0\r\n", b"\x01", 8
-_NANOSECONDS = 1e9
 
 
 def is_ros(path: Path) -> bool:
@@ -69,19 +68,14 @@ def read_mcap(path: Path, selection: Selection) -> Recorded:
         counts, flat, others = _topics(summary, name)
         topic = chosen_topic(counts, selection.topic, others, name, _CURE, flat)
         start, end = summary.statistics.message_start_time, summary.statistics.message_end_time
-        first, begin = 0, start
-        if selection.at is not None:
-            begin += int(selection.at * _NANOSECONDS)
-        else:
+        first, begin = 0, selection.begin(start)
+        if selection.at is None:
             first = selection.first_of(counts[topic], name, "clouds of this topic")
         told = reader.iter_messages(topics=[topic])
         clouds = (each for each in told if _kind(*each[:2]) in _KINDS and each[2].log_time >= begin)
         with foreign_parser(name, "an MCAP file", RECOVER):
             chosen = list(islice(clouds, first, first + selection.accumulate))
-    if len(chosen) < selection.accumulate:
-        problem = f"holds {len(chosen)} clouds of this topic from {selection.at or 0:g} s on"
-        cure = f"it lasts {(end - start) / _NANOSECONDS:.1f} s, choose an earlier time"
-        raise fault(name, f"{problem}, {selection.accumulate} were asked for", cure)
+    selection.check_enough(len(chosen), start, end, name)
     clouds_at = [_cloud(schema, channel, message, name) for schema, channel, message in chosen]
     return check_filled(_laid_together(clouds_at), name)
 

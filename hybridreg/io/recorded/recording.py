@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from hybridreg.io.faults import fault
 
+_NANOSECONDS = 1e9
 Array = NDArray[np.float64]
 
 RECOVER = "run `mcap recover` on it"
@@ -85,6 +86,23 @@ class Selection:
             asked = f"index {index}" + (f" and {self.accumulate - 1} after it" if self.accumulate > 1 else "")
             raise fault(name, f"holds {count} {what}, {asked} was asked for", f"choose from 0 to {count - 1}")
         return first
+
+    def begin(self, start: int) -> int:
+        """From when on clouds count, nanoseconds, in a recording that starts at `start`."""
+        return start + int((self.at or 0.0) * _NANOSECONDS)
+
+    def check_enough(self, held: int, start: int, end: int, name: str) -> None:
+        """Refuse where fewer clouds are there than were asked for, in a recording from `start` to `end`, nanoseconds.
+
+        Raises
+        ------
+        ValueError
+            There are fewer.
+        """
+        if held < self.accumulate:
+            problem = f"holds {held} clouds of this topic from {self.at or 0:g} s on"
+            cure = f"it lasts {(end - start) / _NANOSECONDS:.1f} s, choose an earlier time"
+            raise fault(name, f"{problem}, {self.accumulate} were asked for", cure)
 
 
 ANY = Selection()
