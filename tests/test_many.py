@@ -200,6 +200,19 @@ def test_a_pattern_that_fits_nothing_and_one_without_a_target(tmp_path: Path) ->
     assert "a file of this name is in the way" in done.stderr
 
 
+@pytest.mark.parametrize("command", ["batch", "together"])
+def test_nothing_that_is_read_is_written_over(tmp_path: Path, command: str) -> None:
+    table = tmp_path / "poses.csv"
+    table.write_text("source,target\na.ply,b.ply\n")
+    (tmp_path / "a.ply").touch()
+    given = [str(table), str(tmp_path / "a.ply")] if command == "together" else [str(table)]
+    done = CliRunner().invoke(app, [command, *given, "--out", str(tmp_path / "." / "x" / "..")])
+    assert done.exit_code == 2
+    told = " ".join(done.output.split())
+    assert "poses.csv: is read, and would be written over; choose another --out" in told
+    assert table.read_text().startswith("source,target")
+
+
 def test_clouds_of_a_batch_are_named_one_by_one_or_by_patterns(tmp_path: Path) -> None:
     for name in ("s10.csv", "s9.csv", "s[1].csv", "map.ply"):
         (tmp_path / name).write_bytes(b"")

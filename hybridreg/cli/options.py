@@ -175,10 +175,21 @@ def check_cloud_file(path: Path | None, read: Iterable[str | Path] = ()) -> None
         return
     if path.suffix.lower() not in (".ply", ".pcd"):
         raise ValueError(f"{path}: clouds are written as .ply or .pcd; choose such a name")
-    if os.path.realpath(path) in map(os.path.realpath, read):
+    if _is_among(path, read):
         raise ValueError(
             f"{path}: is one of the clouds that are read, and would be lost; choose another name"
         )
+
+
+def check_folder(out: Path, written: Iterable[str], read: Iterable[str | Path]) -> None:
+    """Refuse a folder in which a file that is `read` has the name of one that is `written` there."""
+    for path in (out / name for name in written):
+        if _is_among(path, read):
+            raise ValueError(f"{path}: is read, and would be written over; choose another --out")
+
+
+def _is_among(path: Path, read: Iterable[str | Path]) -> bool:
+    return os.path.realpath(path) in map(os.path.realpath, read)
 
 
 def check_form(form: str) -> None:

@@ -43,11 +43,12 @@ def command(
     from rich.console import Console
     from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
-    from hybridreg.many.together_run import files_of, run
+    from hybridreg.many.together_run import WRITTEN, files_of, run
 
     options.check_form(form)
     files = files_of(what)
     options.check_cloud_file(merged, files)
+    options.check_folder(out, WRITTEN, files)
     columns = (
         SpinnerColumn(),
         TextColumn("{task.completed:.0f} pairs of {task.description}"),

@@ -28,7 +28,7 @@ from hybridreg.pipeline import Pipeline
 from hybridreg.runtime.workers import spread
 
 Row = dict[str, Any]
-_ROWS, _TABLE = "rows.jsonl", "poses.csv"
+WRITTEN = _ROWS, _TABLE = "rows.jsonl", "poses.csv"
 _COLUMNS = (
     "id",
     "source",

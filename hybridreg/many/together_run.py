@@ -26,7 +26,7 @@ from hybridreg.many.link_search import aligned
 from hybridreg.output.pose_files import pose_files
 from hybridreg.output.pose_text import position_and_quaternion
 
-_LINKS, _TABLE, _ROLES, _ALL = "links.jsonl", "poses.csv", "links.csv", "alignment.json"
+WRITTEN = _LINKS, _TABLE, _ROLES, _ALL = "links.jsonl", "poses.csv", "links.csv", "alignment.json"
 
 
 def files_of(what: Sequence[str]) -> list[str]:
