@@ -45,7 +45,9 @@ def command(
     from hybridreg.many.jobs import jobs_of
 
     jobs = jobs_of(what, target)
-    options.check_folder(out, WRITTEN, [*what, *(cloud for job in jobs for cloud in (job.source, job.target))])
+    options.check_folder(
+        out, WRITTEN, [*what, *(cloud for job in jobs for cloud in (job.source, job.target))]
+    )
     with (
         going_on(lambda: f"finished pairs are kept in {out}: the same command goes on from there"),
         Progress(console=Console(stderr=True), disable=not sys.stderr.isatty()) as progress,

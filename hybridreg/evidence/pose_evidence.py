@@ -9,12 +9,13 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from hybridreg.evidence import information, scale
+from hybridreg.evidence import information, scale, stretch
 from hybridreg.evidence.agreement import Agreement, compare
 from hybridreg.evidence.evidence import Evidence
 from hybridreg.evidence.information import Information
 from hybridreg.evidence.log_odds import log_odds
 from hybridreg.evidence.scale import Size
+from hybridreg.evidence.stretch import Stretch
 from hybridreg.evidence.surface_distance import closeness
 from hybridreg.evidence.views import Views
 
@@ -52,3 +53,8 @@ class PoseEvidence:
     def size(self) -> Size:
         """The size at which the source fits better, if any."""
         return scale.size(self.views, self.T, self.closeness)
+
+    @cached_property
+    def stretch(self) -> Stretch | None:
+        """How the source must be stretched to fit better, if it must."""
+        return stretch.stretch(self.views, self.T, self.closeness)

@@ -31,8 +31,8 @@ _POINTS = 120
 _SHARE = 0.5
 # Turns and cells of either axis within which there is one peak; by hand.
 _WINDOW = (3, 5, 5)
-# Guesses that are settled, at most; by hand.
-_MOST = 4
+# Guesses that are settled, at most, and of either kind those that are tried together; by hand.
+_MOST, _EACH = 4, 2
 # Times that each is settled: a guess is half a cell and half a degree off; by hand.
 _ROUNDS = 2
 # Nats per point by which the clouds must lie less closely on one another half-way between two copies than at either: by
@@ -53,7 +53,11 @@ def near_copies(views: Views, T_target_source: Array, axes: Array, allowed: Tole
     def apart(M: Array) -> bool:
         return not Tolerance.between(np.eye(4), M, middle).within(allowed)
 
-    guesses = [M for M in (*_shifted(points, reach), *_raised(points, reach)) if apart(M)][:_MOST]
+    shifted, raised = (
+        list(filter(apart, found)) for found in (_shifted(points, reach), _raised(points, reach))
+    )
+    both = [up @ along for along in shifted[:_EACH] for up in raised[:_EACH]]
+    guesses = [*[*shifted, *raised][:_MOST], *both]
     if not guesses:
         return []
     settled = np.array([M @ T_target_source for M in guesses])

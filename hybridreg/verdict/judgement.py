@@ -114,6 +114,7 @@ def judge(scene: Scene, pose: Pose, matches: Correspondences) -> Judgement:
         started=scene.pair.placed is not None,
         through_walls=bounds.through_walls(scene, evidence),
         lone_thing=DOUBTED >= weighed.confidence > FAILED and bounds.is_lone_thing(scene, weighed.at),
+        stretch=weighed.at.stretch if DOUBTED >= weighed.confidence >= FAILED else None,
         slack=weighed.slack,
         drawn=weighed.drawn,
     )
@@ -161,7 +162,7 @@ def _believed(
         probability = FAILED
     if slack or bounds.through_walls(scene, evidence) or bounds.looks_alike(scene, at, found):
         return min(probability, DOUBTED)
-    if probability > DOUBTED and bounds.is_lone_thing(scene, at):
+    if probability > DOUBTED and (bounds.is_lone_thing(scene, at) or at.stretch is not None):
         return DOUBTED
     return probability
 

@@ -6,12 +6,16 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hybridreg.evidence.agreement import Agreement
 from hybridreg.evidence.evidence import Evidence
 from hybridreg.evidence.information import Information
+from hybridreg.evidence.stretch import Stretch
 from hybridreg.resolution import Tolerance
 from hybridreg.verdict.confidence import CLEAR, LIKELY, SIZE_GAIN, SPARSE, mostly_through
+
+Array = NDArray[np.float64]
 
 # The bounds beyond which a number is worth a sentence; nine in ten right poses of simulated scenes stay within them.
 # Share of the visible points that violates free space.
@@ -24,6 +28,8 @@ WEAK = 0.02
 OVERLAP = 0.15
 # Points or cells below which a number tells nothing; by hand.
 FEWEST = 60
+# A stretch so many times as far from 1 as the size that fits best is along one direction; by hand.
+_ONE_WAY = 1.5
 
 
 def reasons(
@@ -37,6 +43,7 @@ def reasons(
     started: bool = False,
     through_walls: bool = False,
     lone_thing: bool = False,
+    stretch: Stretch | None = None,
     slack: Tolerance | None = None,
     drawn: Tolerance | None = None,
 ) -> tuple[str, ...]:
@@ -44,7 +51,7 @@ def reasons(
 
     `explained`: a sentence before these says why no pose was found; `started`: the search began at a given start;
     `through_walls`: more of the walls of flat scans is seen through than at any right pose; `lone_thing`: one thing is
-    seen from one side; `slack`: degrees and metres
+    seen from one side; `stretch`: how the source fits better; `slack`: degrees and metres
     by which a right pose may well be off, where that is more than the tolerance; `drawn`: those by which the surfaces
     draw it to where they fit better.
     """
@@ -55,6 +62,8 @@ def reasons(
         return (f"no pose was found: the estimator had nothing to work with, and returned {instead}",)
     against = (
         *_elsewhere(drawn),
+        *_upside_down(evidence),
+        *_strained(evidence, stretch),
         *_against(evidence, agreement, held, through_walls),
         *_from_one_side(lone_thing),
         *_inexact(slack),
@@ -66,16 +75,6 @@ def reasons(
 def _against(
     evidence: Evidence, agreement: Agreement, held: Information, through_walls: bool
 ) -> Iterator[str]:
-    if evidence.overturned:
-        yield (
-            "the pose turns the world upside down, or puts a sensor below the other cloud's ground; if a cloud may be "
-            'upside down, say so: gravity="unknown" (--gravity unknown)'
-        )
-    if evidence.size_gain > SIZE_GAIN:
-        yield (
-            f"the source fits better when it is multiplied by {evidence.scale:.3f}: "
-            "is it scaled, or its sensor's calibration off?"
-        )
     through = evidence.looked_through
     if through > LOOKED_THROUGH:
         yield (
@@ -120,6 +119,29 @@ def _elsewhere(drawn: Tolerance | None) -> Iterator[str]:
         )
 
 
+def _upside_down(evidence: Evidence) -> Iterator[str]:
+    if evidence.overturned:
+        yield (
+            "the pose turns the world upside down, or puts a sensor below the other cloud's ground; if a cloud may be "
+            'upside down, say so: gravity="unknown" (--gravity unknown)'
+        )
+
+
+def _strained(evidence: Evidence, stretch: Stretch | None) -> Iterator[str]:
+    resized = evidence.size_gain > SIZE_GAIN
+    if stretch and not (resized and abs(stretch.factor - 1.0) < _ONE_WAY * abs(evidence.scale - 1.0)):
+        yield (
+            f"the source fits better when it is stretched by {100.0 * (stretch.factor - 1.0):+.1f} % along "
+            f"({_words(stretch.direction)}) of the target, so no rigid pose is right: was it taken in motion, is an "
+            "axis scaled, or does the map bend? Undo that first, or register a smaller part"
+        )
+    elif resized:
+        yield (
+            f"the source fits better when it is multiplied by {evidence.scale:.3f}: "
+            "is it scaled, or its sensor's calibration off?"
+        )
+
+
 def _from_one_side(lone_thing: bool) -> Iterator[str]:
     if lone_thing:
         yield (
@@ -136,11 +158,15 @@ def _inexact(slack: Tolerance | None) -> Iterator[str]:
 
 
 def _about_axis(agreement: Agreement, k: int) -> str:
-    direction = " ".join(f"{x:.2f}" for x in np.round(agreement.axes[k], 2) + 0.0)  # no "-0.00"
+    direction = _words(agreement.axes[k])
     looked, agreed = int(agreement.looked[k]), int(agreement.agreed[k])
     if looked < FEWEST:
         return f"only {looked} points visible to both sensors face along ({direction}) of the target, {agreed} agree"
     return f"of {looked} visible points that face along ({direction}) of the target, only {agreed} agree"
+
+
+def _words(direction: Array) -> str:
+    return " ".join(f"{x:.2f}" for x in np.round(direction, 2) + 0.0)  # no "-0.00"
 
 
 def _unknown(unseen: Mapping[str, str]) -> Iterator[str]:

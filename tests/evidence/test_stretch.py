@@ -1,0 +1,70 @@
+# SPDX-License-Identifier: MIT
+"""A source that is stretched or sheared along the ground has no right pose, and none of its poses is "ok"."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from made_places import Made
+from numpy.typing import NDArray
+
+import hybridreg as hr
+from hybridreg.classical.voxel import VoxelGrid
+from hybridreg.evidence import views
+from hybridreg.evidence.pose_evidence import PoseEvidence
+from hybridreg.pair import Pair
+
+Array = NDArray[np.float64]
+
+STRETCHED, NARROWED, SHEARED = np.diag([1.05, 1.0, 1.0]), np.diag([1.0, 0.94, 1.0]), np.eye(3)
+SHEARED[0, 1] = 0.05
+
+
+def evidence(made: Made, strain: Array) -> PoseEvidence:
+    """Of the true pose of a source that is strained about its sensor."""
+    pair = made.scene.pair
+    scene = VoxelGrid()(Pair.of(pair.source.points @ strain.T, pair.target.points))
+    return PoseEvidence(views.of(scene), made.truth)
+
+
+@pytest.mark.parametrize(
+    "strain, factor",
+    [(STRETCHED, 1 / 1.05), (NARROWED, 1 / 0.94), (SHEARED, 1.025)],
+    ids=["5", "-6", "shear"],
+)
+def test_the_stretch_is_found_with_its_direction(crossing: Made, strain: Array, factor: float) -> None:
+    found = evidence(crossing, strain).stretch
+    assert found is not None
+    undone = np.linalg.inv(strain) @ crossing.truth[:3, :3].T @ found.direction
+    assert abs(abs(np.log(found.factor)) - abs(np.log(factor))) < 0.01
+    if strain is not SHEARED:
+        assert np.linalg.norm(undone) == pytest.approx(factor, abs=0.01)
+
+
+def test_what_fits_as_it_is_is_not_stretched(crossing: Made, fan: Made, corridor: Made) -> None:
+    for made in (crossing, fan, corridor):
+        assert evidence(made, np.eye(3)).stretch is None
+
+
+def test_heights_and_sizes_are_told_otherwise(crossing: Made) -> None:
+    assert evidence(crossing, np.diag([1.0, 1.0, 1.06])).stretch is None
+
+
+@pytest.mark.parametrize("strain", [STRETCHED, NARROWED, SHEARED], ids=["5", "-6", "shear"])
+def test_no_pose_of_a_strained_source_is_ok(crossing: Made, strain: Array) -> None:
+    pair = crossing.scene.pair
+    result = hr.register(pair.source.points @ strain.T, pair.target.points)
+    assert result.verdict != "ok"
+    if result.verdict == "doubtful":
+        assert "the source fits better when it is stretched by" in " ".join(result.reasons)
+
+
+@pytest.mark.parametrize("name", ["kitti-odo-5-to-0", "sustech-965-to-950", "pandaset-001-gt-to-p64"])
+def test_real_pairs(real_data: Path, name: str) -> None:
+    if not (real_data / name).is_dir():
+        pytest.skip(f"no pair {name}")
+    source, target = (np.load(real_data / name / f"{side}.npz")["xyz"] for side in ("source", "target"))
+    assert hr.register(source, target).verdict == "ok"
+    assert hr.register(source * [1.05, 1.0, 1.0], target).verdict != "ok"
