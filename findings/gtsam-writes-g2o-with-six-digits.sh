@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
 # gtsam 4.3.0's `writeG2o` writes six digits of every number. A trajectory in a map's grid (UTM northings are millions of
 # metres) comes back from `readG2o` with its poses up to five metres off, each by another amount, and with neighbours at
-# one place; ten kilometres off the origin it is seven millimetres. The edges beside them hold their few metres to the micron,
-# so that the graph's error, next to nothing before, is large after. Nothing is raised.
+# one place; ten kilometres off the origin it is seven millimetres. The edges between them hold their few metres to the
+# micron, so that the graph's error, next to nothing before, is large after. Nothing is raised.
 #
 # Guess before it was run: text of doubles holds 17 digits, and what was written is what is read.
 # For whom it matters: whoever saves a georeferenced pose graph, for a start or a comparison, or takes a .g2o file's
