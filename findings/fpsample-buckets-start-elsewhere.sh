@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
 # fpsample 1.0.2's two samplers by buckets, those that its description recommends, do not start at the row that
 # `start_idx` names: what they return is the farthest point sampling from another row, and seldom holds the one that was
-# asked for. The plain sampler and those with NPDU start where they are told.
+# asked for. A list of rows, which the description of `start_idx` takes as well, raises TypeError. The plain sampler and
+# those with NPDU start where they are told.
 #
 # Guess before it was run: the first index that is returned is `start_idx`, and the exact samplers agree from there on.
 # For whom it matters: whoever fixes the first point (the one nearest the sensor, a keypoint, row 0 to compare with
@@ -51,5 +52,12 @@ for name, way in ways.items():
         else:
             assert rows[0] == start, f"{name} starts elsewhere now"
     print(f"  {name}: start_idx and the first index,", ", ".join(told))
+for name in ("bucket_fps_kdtree_sampling", "bucket_fps_kdline_sampling"):
+    try:
+        ways[name](points, COUNT, start_idx=[3, 1000])
+    except TypeError as error:
+        print(f"  {name}: a list of starts raises", error)
+    else:
+        raise AssertionError(f"{name} takes a list now")
 print("the samplers by buckets start at another point than the one asked for")
 PYTHON
