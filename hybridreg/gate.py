@@ -24,6 +24,7 @@ OR_DROP = ' or pass nonfinite="drop"'
 _LOT = 2**18  # points
 _FILLED = 0.01  # share of points exactly at the origin from which they count as missing returns
 _COARSE = 0.01  # metres between coordinates from which their rounding is reported
+_WHOLE = 1e-6  # of a digit, off by which a decimal number in double precision may be
 _LOOKED_AT = 2_000  # points whose rounding is checked
 
 
@@ -87,22 +88,34 @@ def returned(
 
 
 def rounded(points: Array, name: str) -> None:
-    """Warn of coordinates on a map grid that were kept in single precision, half a metre apart at 5,000 km."""
+    """Warn of coordinates on a map grid that were kept in single precision, half a metre apart at 5,000 km, or were
+    written with six digits, as C and C++ write numbers unless they are told otherwise: ten metres apart there."""
     some = points[:: max(1, len(points) // _LOOKED_AT)]
-    with np.errstate(over="ignore"):
+    some = some[some.any(axis=1)]  # missing returns lie at zero
+    if not len(some):
+        return
+    away = np.median(np.abs(some), axis=0)  # where most points lie: a stray one may be anywhere
+    with np.errstate(over="ignore", invalid="ignore"):
         single = some.astype(np.float32)
-    kept_so = (single == some).all(axis=0)
-    # Where most points lie: a stray one may be anywhere, and missing returns lie at zero.
-    there = np.abs(single[single.any(axis=1)])
-    away = np.median(there, axis=0) if len(there) else np.zeros(3)
-    step = float(np.where(kept_so, np.spacing(away.astype(np.float32)), 0.0).max())
-    if step > _COARSE:
-        warnings.warn(
-            f"{name}: its coordinates were kept in single precision far from the origin, {step:.2g} m apart; export "
-            "them in double precision, or subtract a local origin before they are stored",
-            UserWarning,
-            stacklevel=4,
-        )
+        kept_so = (single == some).all(axis=0)
+        step = float(np.where(kept_so, np.spacing(away.astype(np.float32)), 0.0).max())
+        units = 10.0 ** (np.floor(np.log10(np.where(some == 0.0, 1.0, np.abs(some)))) - 5.0)
+        written_so = bool((np.abs(some / units - np.round(some / units)) < _WHOLE).all())
+    longest = float(away.max())
+    sixth = 10.0 ** (np.floor(np.log10(longest)) - 5.0) if longest > 0.0 else 0.0
+    if written_so and sixth > _COARSE and (np.abs(np.remainder(some, 10.0 * sixth)) > 0.5 * sixth).any():
+        _tell_rounded(name, "written with six digits", "with more digits, or binary", sixth)
+    elif step > _COARSE:
+        _tell_rounded(name, "kept in single precision", "in double precision", step)
+
+
+def _tell_rounded(name: str, problem: str, cure: str, step: float) -> None:
+    warnings.warn(
+        f"{name}: its coordinates were {problem} far from the origin, {step:.2g} m apart; export them {cure}, or "
+        "subtract a local origin before they are stored",
+        UserWarning,
+        stacklevel=5,
+    )
 
 
 def check(points: Array, name: str) -> None:

@@ -176,6 +176,35 @@ def test_map_coordinates_in_single_precision_are_told(dtype: str, told: bool) ->
     assert any("map: its coordinates were kept in single precision" in str(w.message) for w in seen) == told
 
 
+@pytest.mark.parametrize(
+    "digits, offset, apart",
+    [
+        ("%.6g", [500_000.0, 5_400_000.0, 300.0], "10 m"),  # UTM
+        ("%.6g", [600_000.0, 200_000.0, 300.0], "1 m"),
+        ("%.6g", [15_000.0, 28_000.0, 300.0], "0.1 m"),
+        ("%.6g", [1_000.0, 2_000.0, 300.0], ""),
+        ("%.6g", [0.0, 0.0, 0.0], ""),
+        ("%.10g", [500_000.0, 5_400_000.0, 300.0], ""),
+        ("%.1f", [15_000.0, 28_000.0, 300.0], ""),  # a raster of heights
+    ],
+)
+def test_map_coordinates_of_six_digits_are_told(digits: str, offset: list[float], apart: str) -> None:
+    # As Open3D 0.20.0 writes PLY in ascii and OpenCV 5.0.0 writes OBJ.
+    points = np.random.default_rng(0).uniform(-20.0, 20.0, (200, 3)) + offset
+    written = np.array([[float(digits % value) for value in point] for point in points])
+    if digits == "%.1f":
+        written[:, 2] = points[:, 2]
+    with warnings.catch_warnings(record=True) as seen:
+        warnings.simplefilter("always")
+        PointCloud.of(np.vstack([written, np.zeros((1, 3))]), name="map")
+    words = [str(each.message) for each in seen]
+    assert len(words) == bool(apart)
+    assert all(
+        f"map: its coordinates were written with six digits far from the origin, {apart} apart" in w
+        for w in words
+    )
+
+
 def test_a_sensor_frame_in_single_precision_is_fine() -> None:
     points = np.random.default_rng(0).uniform(-200.0, 200.0, (200, 3)).astype("f4")
     with warnings.catch_warnings():

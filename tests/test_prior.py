@@ -382,10 +382,17 @@ def test_text_that_is_no_pose_is_refused_with_what_is_expected(tmp_path: Path, t
         read_pose(tmp_path / "pose.txt")
 
 
-@pytest.mark.parametrize("held", ["transformation", "T_target_source"])
+@pytest.mark.parametrize("held", ["transformation", "T_target_source", "homogeneous", "transform_matrix"])
 def test_a_result_in_place_of_its_pose_is_told(held: str) -> None:
     with pytest.raises(ValueError, match=f"init: expected numbers .*; give its {held}"):
         Prior(init=SimpleNamespace(**{held: TURNED}))
+
+
+@pytest.mark.parametrize("held", ["matrix", "as_matrix"])
+def test_a_pose_of_another_library_in_place_of_its_matrix_is_told(held: str) -> None:
+    # gtsam 4.3.0's Pose3 has the first, scipy 1.17's RigidTransform the second.
+    with pytest.raises(ValueError, match=rf"init: expected numbers .*; give its {held}\(\)"):
+        Prior(init=SimpleNamespace(**{held: lambda: TURNED}))
 
 
 @pytest.mark.parametrize("quoted", [False, True])

@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 # R R^T of a rotation in double precision is off by less.
 _EXACT = 1e-12
-# Where results of registrations keep their pose: ours and Open3D's, small_gicp's.
-_HOLD = ("transformation", "T_target_source")
+# Where results of registrations keep their pose: ours and Open3D's, small_gicp's. Where other libraries' poses keep
+# their matrix: gtsam and Sophus, scipy, pinocchio, the kit of Argoverse 2.
+_HOLD = ("transformation", "T_target_source", "matrix", "as_matrix", "homogeneous", "transform_matrix")
 
 
 def from_rt(R: Array, t: Array) -> Array:
@@ -127,7 +128,7 @@ def check(T: Any, name: str = "T", tolerance: float = 1e-4) -> Array:
         matrix = np.asarray(T, dtype=np.float64)
     except (TypeError, ValueError, OverflowError) as error:
         held = next((each for each in _HOLD if hasattr(T, each)), "")
-        cure = f"; give its {held}" if held else ""
+        cure = f"; give its {held}{'()' if callable(getattr(T, held)) else ''}" if held else ""
         raise ValueError(f"{name}: expected numbers of shape (4, 4) ({error}){cure}") from error
     if matrix.shape != (4, 4):
         raise ValueError(f"{name}: expected shape (4, 4), got {matrix.shape}{_CURES.get(matrix.shape, '')}")

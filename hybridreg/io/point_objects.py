@@ -23,8 +23,15 @@ from hybridreg.io.recorded import ros_messages, vtk_objects
 
 Array = NDArray[np.float64]
 
-# Where objects keep their points: pypcd, dev kits and laspy, Open3D and most others, torch_geometric, trimesh's clouds.
-_HOLD = ("pc_data", "xyz", "points", "pos", "positions", "vertices")
+# Where objects keep their points: pypcd, dev kits and laspy, Open3D and most others, torch_geometric, trimesh's clouds,
+# pymeshlab, py4dgeo.
+_HOLD = ("pc_data", "xyz", "points", "pos", "positions", "vertices", "vertex_matrix", "cloud")
+# Where meshes keep their vertices, and how to ask for them: Open3D's tensors, trimesh and others, pymeshlab.
+_VERTICES = {
+    "vertex": 'x.vertex["positions"]',
+    "vertices": "x.vertices",
+    "vertex_matrix": "x.vertex_matrix()",
+}
 _DEEPEST = 3
 _CURE = "pass an array of shape (N, 3), such as numpy.column_stack([x, y, z])"
 
@@ -190,23 +197,29 @@ def _refuse_grid(x: Any, names: list[Any] | None, name: str) -> None:
 def _refuse_mesh(x: Any, name: str) -> None:
     if hasattr(x, "geometry") and callable(getattr(x, "to_mesh", None)):
         _refuse(x, name, "a scene is not a cloud; sample its surfaces: x.to_mesh().sample(100_000)")
-    if not any(hasattr(x, each) for each in ("triangles", "triangle", "faces")) or _has_no_faces(x):
+    if callable(getattr(x, "current_mesh", None)):  # pymeshlab's sets
+        _refuse(x, name, "it holds several meshes; give one of them, x.current_mesh()")
+    if not _has_faces(x):
         return
     sample = "sample_points_uniformly" if hasattr(x, "sample_points_uniformly") else "sample"
-    where = (
-        'x.vertex["positions"]'
-        if hasattr(x, "vertex")
-        else "x.vertices"
-        if hasattr(x, "vertices")
-        else "x.points"
-    )
+    vertices = next((words for held, words in _VERTICES.items() if hasattr(x, held)), "x.points")
     how = f"sample its surface, x.{sample}(100_000)" if hasattr(x, sample) else "sample its surface"
-    _refuse(x, name, f"a mesh is not a cloud; {how}, or pass its vertices, {where}, where they lie densely")
+    _refuse(
+        x, name, f"a mesh is not a cloud; {how}, or pass its vertices, {vertices}, where they lie densely"
+    )
 
 
-def _has_no_faces(x: Any) -> bool:
-    faces = getattr(x, "faces", None)
-    return faces is not None and not callable(faces) and len(faces) == 0
+def _has_faces(x: Any) -> bool:
+    if callable(getattr(x, "face_number", None)):  # pymeshlab
+        return bool(x.face_number())
+    if any(hasattr(x, each) for each in ("triangles", "triangle", "faces")):
+        faces = getattr(x, "faces", None)
+        return faces is None or callable(faces) or len(faces) > 0
+    cells, mesh = getattr(x, "cells", None), getattr(x, "mesh", None)
+    if isinstance(cells, (list, tuple)):  # meshio, whose points may be cells too
+        return any(getattr(cell, "type", "vertex") != "vertex" and len(cell.data) for cell in cells)
+    # pyntcloud, whose faces are a table beside the points
+    return mesh is not None and tables.labels(mesh) is not None and len(mesh) > 0
 
 
 def _as_array(x: Any, name: str) -> NDArray[Any]:

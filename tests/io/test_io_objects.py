@@ -440,6 +440,35 @@ def test_open3d() -> None:
     assert "image" in refused(o3d.geometry.Image()).lower()
 
 
+def test_meshes_of_meshio_pyntcloud_and_pymeshlab_are_no_clouds() -> None:
+    # As meshio 5.3.5, pyntcloud 0.3.1 and pymeshlab 2025.7 keep them: the vertices where others keep a cloud's points,
+    # the faces elsewhere. Of the first two the vertices were read, however far apart.
+    pandas = pytest.importorskip("pandas")
+    points, triangle = pandas.DataFrame(P, columns=list("xyz")), np.array([[0, 1, 2]])
+    faces = pandas.DataFrame(triangle, columns=["v1", "v2", "v3"])
+
+    def meshio(kind: str, rows: np.ndarray) -> SimpleNamespace:
+        return SimpleNamespace(points=P, cells=[SimpleNamespace(type=kind, data=rows)])
+
+    def meshlab(count: int) -> SimpleNamespace:
+        return SimpleNamespace(
+            vertex_matrix=lambda: P, face_matrix=lambda: triangle, face_number=lambda: count
+        )
+
+    same(SimpleNamespace(points=P, cells=[]))
+    same(meshio("vertex", np.arange(len(P))[:, None]))
+    same(SimpleNamespace(points=points, mesh=None))
+    same(meshlab(0))
+    for mesh in (meshio("triangle", triangle), SimpleNamespace(points=points, mesh=faces)):
+        assert "a mesh is not a cloud; sample its surface, or pass its vertices, x.points" in refused(mesh)
+    assert "x.vertex_matrix()" in refused(meshlab(1))
+    assert "x.current_mesh()" in refused(SimpleNamespace(current_mesh=lambda: meshlab(0)))
+
+
+def test_epochs_of_py4dgeo() -> None:
+    same(SimpleNamespace(cloud=P, normals=None))  # as py4dgeo 1.2.0 keeps them
+
+
 def test_small_gicp_and_plyfile() -> None:
     small_gicp = pytest.importorskip("small_gicp")
     same(small_gicp.PointCloud(P))

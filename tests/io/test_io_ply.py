@@ -3,6 +3,7 @@ from __future__ import annotations
 
 import struct
 import tracemalloc
+import warnings
 
 import numpy as np
 import pytest
@@ -207,3 +208,21 @@ def test_two_elements_of_vertices_are_refused():
         ValueError, match=r"a\.ply: has 2 elements 'vertex', of 1 and 2 points; export them as one"
     ):
         parse_ply(data, "a.ply")
+
+
+@pytest.mark.parametrize(
+    "vertices, faces, told", [(400, 722, True), (400, 12, False), (400, 0, False), (30_000, 60_000, False)]
+)
+def test_a_coarse_surface_is_told_to_be_read_as_its_vertices(vertices: int, faces: int, told: bool) -> None:
+    # Of the same surface as OBJ, OFF or STL, which meshio 5.3.5 and pymeshlab 2025.7 write as readily, 200,000 points
+    # are read; of PLY the vertices were, without a word.
+    element = f"element face {faces}\nproperty list uchar int vertex_indices"
+    rows = np.random.default_rng(0).normal(size=(vertices, 3)).astype("<f4")
+    data = header(f"element vertex {vertices}", AXES.rstrip(), element) + rows.tobytes()
+    data += (b"\x03" + np.array([0, 1, 2], "<i4").tobytes()) * faces
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        np.testing.assert_array_equal(parse_ply(data, "roof.ply"), rows)
+    words = [str(each.message) for each in caught]
+    assert words == [each for each in words if "roof.ply: it is a surface, of which the 400 vertices" in each]
+    assert len(words) == told
