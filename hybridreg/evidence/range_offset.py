@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from hybridreg.evidence.strained import close_steps
+from hybridreg.evidence.strained import POINTS, close_steps
 from hybridreg.evidence.surface_distance import one_way
 from hybridreg.evidence.views import Views
 from hybridreg.geometry import se3
@@ -19,8 +19,6 @@ Array = NDArray[np.float64]
 _OFFSETS = (-0.2, -0.15, -0.1, -0.05, 0.05, 0.1, 0.15, 0.2)
 # Strains that move half of the points farther than this have another cause, metres; by hand.
 _MOST = 0.4
-# Points that take part; by hand.
-_POINTS = 700
 
 
 def explains(views: Views, T_target_source: Array, strained: Array) -> bool:
@@ -37,7 +35,7 @@ def explains(views: Views, T_target_source: Array, strained: Array) -> bool:
     def closely(offset: float) -> float:
         shifted = source.asked + offset * rays / ranges
         return one_way(
-            shifted, target, descend(T_target_source, shifted[:_POINTS], target, close_steps(target))
+            shifted, target, descend(T_target_source, shifted[:POINTS], target, close_steps(target))
         )
 
     return max(map(closely, _OFFSETS)) >= one_way(source.asked, target, strained)

@@ -17,8 +17,6 @@ from hybridreg.resolution import Tolerance
 
 Array = NDArray[np.float64]
 
-# Points that take part; by hand.
-_POINTS = 700
 # One strain: the size.
 _ALIKE = np.eye(3)[None]
 # Scales beyond this are no small error, and are not looked for here; by hand.
@@ -41,7 +39,7 @@ class Size(NamedTuple):
 
 def size(views: Views, T_target_source: Array, close: float) -> Size:
     """Size at which the source fits best about a pose (4, 4) whose closeness is `close`."""
-    fitted = strained(views, T_target_source, _ALIKE, _POINTS)
+    fitted = strained(views, T_target_source, _ALIKE)
     scale = float(np.cbrt(np.linalg.det(fitted[:3, :3])))
     if not _LEAST < abs(np.log(max(scale, 1e-9))) < np.log(_MOST):
         return Size()

@@ -16,26 +16,26 @@ Array = NDArray[np.float64]
 _ROUGHLY = (8.0, 5.0, 4.0, 3.0, 2.0, 2.0)
 # Farthest partners of the fine steps, shares of the fine surfaces' own; by hand.
 _CLOSELY = (1.0, 0.6, 0.4)
+# Points that take part; by hand.
+POINTS = 700
 # Width of the weights per farthest partner; by hand.
 _TRUST = 0.25
 
 
-def strained(views: Views, T_target_source: Array, strains: Array, points: int) -> Array:
+def strained(views: Views, T_target_source: Array, strains: Array) -> Array:
     """The affine map (4, 4) near a pose that fits best: the pose moves and strains the source.
 
     Parameters
     ----------
     strains : (k, 3, 3)
         As `hybridreg.geometry.point_to_plane.descend` takes them.
-    points : int
-        How many take part, at most.
     """
     spacing = views.spacing
-    some = views.source.points[views.source.settling[:points]]
+    some = views.source.points[views.source.settling[:POINTS]]
     roughly = [_step(reach * spacing, spacing) for reach in _ROUGHLY]
     A = descend(T_target_source, some, views.target, roughly, strains)
     fine, surfaces = views.fine
-    return descend(A, fine.asked[:points], surfaces, close_steps(surfaces), strains)
+    return descend(A, fine.asked[:POINTS], surfaces, close_steps(surfaces), strains)
 
 
 def close_steps(surfaces: Surfaces) -> list[tuple[float, float]]:

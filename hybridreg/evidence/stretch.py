@@ -23,22 +23,30 @@ from hybridreg.resolution import tolerance
 
 Array = NDArray[np.float64]
 
-# Points that take part; by hand.
-_POINTS = 1500
 # Nats per point that it must gain, and tolerances by which it must move the farther points, those beyond so many per
 # cent of the others: by hand. Of 110 right poses, real and of `sim:val`, one gains as much, and moves them by 0.2.
 _GAIN = 0.15
 _HARM = 0.6
 _FARTHER = 90.0
+# Share of the greater strain from which the lesser makes them a size; by hand.
+_ALIKE = 0.5
 # Factors beyond this are no strain of a scan; by hand.
 _MOST = 0.15
 
 
 class Stretch(NamedTuple):
-    """`factor` by which the source must be stretched along a `direction` (3,) of the target to fit best."""
+    """`factor` by which the source must be stretched along a level `direction` (3,) of the target to fit best, and the
+    one `across` it."""
 
     factor: float
     direction: Array
+    across: float
+
+    @property
+    def is_size(self) -> bool:
+        """Whether it is much the same along every direction."""
+        most, least = self.factor - 1.0, self.across - 1.0
+        return bool(least / most > _ALIKE)
 
 
 def stretch(views: Views, T_target_source: Array, close: float) -> Stretch | None:
@@ -47,17 +55,18 @@ def stretch(views: Views, T_target_source: Array, close: float) -> Stretch | Non
     up = _up(views, T_target_source)
     if up is None:
         return None
-    fitted = strained(views, T_target_source, _level(up), _POINTS)
+    fitted = strained(views, T_target_source, _level(up))
     A = fitted[:3, :3]
     left = A @ se3.project(A).T
     factors, directions = np.linalg.eigh((left + left.T) / 2.0)
-    k = int(np.argmax(np.abs(factors - 1.0)))
+    level = np.argsort(np.abs(up @ directions))[:2]
+    k, across = level[np.argsort(-np.abs(factors[level] - 1.0))]
     strain = abs(factors[k] - 1.0)
     if strain > _MOST or strain * _reach(views) < _HARM or closeness(views.fine, fitted) - close < _GAIN:
         return None
     if range_offset.explains(views, T_target_source, fitted):
         return None
-    return Stretch(float(factors[k]), directions[:, k])
+    return Stretch(float(factors[k]), directions[:, k], float(factors[across]))
 
 
 def _reach(views: Views) -> float:

@@ -28,8 +28,6 @@ WEAK = 0.02
 OVERLAP = 0.15
 # Points or cells below which a number tells nothing; by hand.
 FEWEST = 60
-# A stretch so many times as far from 1 as the size that fits best is along one direction; by hand.
-_ONE_WAY = 1.5
 
 
 def reasons(
@@ -129,15 +127,16 @@ def _upside_down(evidence: Evidence) -> Iterator[str]:
 
 def _strained(evidence: Evidence, stretch: Stretch | None) -> Iterator[str]:
     resized = evidence.size_gain > SIZE_GAIN
-    if stretch and not (resized and abs(stretch.factor - 1.0) < _ONE_WAY * abs(evidence.scale - 1.0)):
+    if stretch and not stretch.is_size:
         yield (
             f"the source fits better when it is stretched by {100.0 * (stretch.factor - 1.0):+.1f} % along "
             f"({_words(stretch.direction)}) of the target, so no rigid pose is right: was it taken in motion, is an "
             "axis scaled, or does the map bend? Undo that first, or register a smaller part"
         )
-    elif resized:
+    elif stretch or resized:
+        scale = evidence.scale if resized or not stretch else 0.5 * (stretch.factor + stretch.across)
         yield (
-            f"the source fits better when it is multiplied by {evidence.scale:.3f}: "
+            f"the source fits better when it is multiplied by {scale:.3f}: "
             "is it scaled, or its sensor's calibration off?"
         )
 

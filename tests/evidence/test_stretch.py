@@ -14,6 +14,7 @@ import hybridreg as hr
 from hybridreg.classical.voxel import VoxelGrid
 from hybridreg.evidence import views
 from hybridreg.evidence.pose_evidence import PoseEvidence
+from hybridreg.evidence.stretch import Stretch
 from hybridreg.pair import Pair
 
 Array = NDArray[np.float64]
@@ -48,8 +49,13 @@ def test_what_fits_as_it_is_is_not_stretched(crossing: Made, fan: Made, corridor
         assert evidence(made, np.eye(3)).stretch is None
 
 
-def test_heights_and_sizes_are_told_otherwise(crossing: Made) -> None:
+def test_heights_are_left_out_and_a_size_is_told_as_one(crossing: Made) -> None:
     assert evidence(crossing, np.diag([1.0, 1.0, 1.06])).stretch is None
+    sized = evidence(crossing, 1.04 * np.eye(3)).stretch
+    assert sized is not None
+    assert sized.is_size
+    assert not Stretch(1.05, np.eye(3)[0], 1.01).is_size
+    assert not Stretch(1.025, np.eye(3)[0], 0.975).is_size
 
 
 @pytest.mark.parametrize("strain", [STRETCHED, NARROWED, SHEARED], ids=["5", "-6", "shear"])
