@@ -32,6 +32,16 @@ def scaled(rng: np.random.Generator, seed: int) -> Sample:
     return _hopeless(pair, pair.source / factor, f"scale {factor}")
 
 
+def strained(rng: np.random.Generator, seed: int) -> Sample:
+    """The source stretched or narrowed by 4 to 10 % along one level direction, or sheared by as much."""
+    pair = _solvable(maps.map_sensor if rng.random() < 0.5 else hung.plain, rng, seed)
+    turned = se3.yaw(rng.uniform(0.0, 360.0))[:3, :3]
+    part = float(rng.choice([-1.0, 1.0]) * rng.uniform(0.04, 0.1))
+    strain = np.eye(3)
+    strain[0, int(rng.random() < 0.5)] += part
+    return _hopeless(pair, pair.source @ (turned @ strain @ turned.T).T, f"strain {part:.3f}")
+
+
 def unit(rng: np.random.Generator, seed: int) -> Sample:
     """The source in millimetres, centimetres or feet."""
     pair = _ordinary(rng, seed)

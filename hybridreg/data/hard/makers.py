@@ -28,6 +28,7 @@ _MAKERS: dict[str, Maker] = {
     "building": floors.building,
     "mirrored": impossible.mirrored,
     "scaled": impossible.scaled,
+    "strained": impossible.strained,
     "unit": impossible.unit,
     "doubled": impossible.doubled,
     "disjoint": impossible.disjoint,
