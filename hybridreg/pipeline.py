@@ -184,7 +184,10 @@ class Pipeline(Stage):
         """
         reset_peak_memory()
         with optional_packages.told("a stage of this pipeline"), one_blas():
-            return self.conclude(self.trace(pair, seed=seed, matches=matches), seed=seed)
+            trace = self.trace(pair, seed=seed, matches=matches)
+            result = self.conclude(trace, seed=seed)
+            trace.scene.release()
+            return result
 
     def conclude(self, trace: Trace, *, seed: int = 0) -> RegistrationResult:
         """The verdict on a traced run, and its result in the user's coordinates."""
