@@ -92,6 +92,20 @@ def test_apply_takes_what_register_takes(result: Any, tmp_path: Path) -> None:
         found.apply(np.zeros(4))
 
 
+def test_apply_keeps_every_row(result: Any, tmp_path: Path) -> None:
+    found, pair, _ = result
+    few = pair.source.points[:3].copy()
+    few[1] = np.nan
+    wanted = se3.apply(found.transformation, few)
+    np.save(tmp_path / "few.npy", few)
+    table = {name: few[:, i] for i, name in enumerate("xyz")}
+    records = np.rec.fromarrays(list(few.T), names="x,y,z")
+    for cloud in (few, few.tolist(), table, records, tmp_path / "few.npy"):
+        np.testing.assert_array_equal(found.apply(cloud), wanted)
+    assert found.apply(np.zeros((0, 3))).shape == (0, 3)
+    np.testing.assert_array_equal(found.apply(hr.Target(pair.source)), found.apply(pair.source))
+
+
 def test_words_and_pictures(result: Any) -> None:
     found, pair, _ = result
     text = found.summary()
