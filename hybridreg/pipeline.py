@@ -226,6 +226,7 @@ class Pipeline(Stage):
         from hybridreg.evidence.match_agreement import of_most
 
         clock = Clock()
+        fitting.check_image(self, pair)
         if self.prior is not None:
             if matches is not None and self.prior.crop and not isinstance(matches, Correspondences):
                 raise ValueError(
@@ -233,7 +234,6 @@ class Pipeline(Stage):
                 )
             with clock.phase("prior"):
                 pair = self.prior.applied(pair)
-        fitting.check_image(self, pair)
         fitting.check_seed(seed)
         rng = np.random.default_rng([seed, zlib.crc32(pair.id.encode())])
         with clock.phase("downsample"):
