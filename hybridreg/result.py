@@ -167,10 +167,15 @@ class RegistrationResult:
         return result_words.html(self)
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain numbers, lists and strings; the per-point arrays become their counts. `hybridreg` is the version."""
+        """Plain numbers, lists and strings; the per-point arrays become their counts. `hybridreg` is the version; of
+        `covariance` what is infinite is None."""
         left_out = {"overlay", "matches"}
         plain = {f.name: _plain(getattr(self, f.name)) for f in fields(self) if f.name not in left_out}
         plain |= {name: getattr(self, name) for name in _MEASURED}
+        # JSON has no infinity.
+        plain["covariance"] = [
+            [x if np.isfinite(x) else None for x in row] for row in self.covariance.tolist()
+        ]
         counts = {"n_correspondences": len(self.correspondence_set), "n_matches": len(self.matches)}
         return {**plain, **counts, "hybridreg": _version()}
 

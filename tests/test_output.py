@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import dataclasses
+import json
 import re
 from pathlib import Path
 from typing import Any
@@ -128,6 +129,15 @@ def test_words_and_pictures(result: Any) -> None:
     np.testing.assert_allclose(
         clouds["source, aligned"][0], found.apply(pair.source.points[:1])[0], atol=1e-3
     )
+
+
+def test_a_stored_result_holds_the_covariance(result: Any) -> None:
+    found, _, _ = result
+    np.testing.assert_array_equal(json.loads(found.to_json())["covariance"], found.covariance)
+    loose = dataclasses.replace(found, information=np.diag([1.0, 1.0, 0.0, 1.0, 1.0, 1.0]))
+    told = json.loads(loose.to_json(), parse_constant=lambda word: pytest.fail(f"{word} is no JSON"))
+    assert told["covariance"][2][2] is None
+    assert told["covariance"][0] == loose.covariance[0].tolist()
 
 
 def test_covariance_is_that_of_the_information_about_the_centre(result: Any) -> None:
