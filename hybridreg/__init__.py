@@ -16,47 +16,59 @@ _root = _Path(__file__).resolve().parent.parent
 if (_root / "pyproject.toml").is_file() and (_root / "classical").is_dir():
     __path__.append(str(_root))
 
-if TYPE_CHECKING:
-    from hybridreg.api import read, register
-    from hybridreg.candidates.candidates import Candidates
-    from hybridreg.classical.fgr import Fgr
-    from hybridreg.classical.fpfh import Fpfh
-    from hybridreg.classical.gicp import Gicp
-    from hybridreg.classical.hcf.hcf import Hcf
-    from hybridreg.classical.icp import Icp
-    from hybridreg.classical.kiss import KissMatcher
-    from hybridreg.classical.kiss_icp import KissIcp
-    from hybridreg.classical.manhattan import Manhattan
-    from hybridreg.classical.nothing import GivenMatches, Identity, NoMatch, NoOverlap, NoRefinement
-    from hybridreg.classical.overhead.birdseye import BirdsEye
-    from hybridreg.classical.overhead.relief_search import ReliefSearch
-    from hybridreg.classical.ransac import Ransac
-    from hybridreg.classical.ransac_50k import Ransac50k
-    from hybridreg.classical.sampling import AllPoints, RandomSample
-    from hybridreg.classical.svd import WeightedSvd
-    from hybridreg.classical.visibility import Visibility
-    from hybridreg.classical.voxel import VoxelGrid
-    from hybridreg.cloud import PointCloud
-    from hybridreg.learned.cofinet.stage import Cofinet
-    from hybridreg.learned.fcgf.stage import Fcgf
-    from hybridreg.learned.omnet.stage import OmNet
-    from hybridreg.learned.predator.stage import Predator, PredatorOverlap
-    from hybridreg.learned.roitr.stage import Roitr
-    from hybridreg.learned.stages.dense import DenseFeatures
-    from hybridreg.learned.stages.geotransformer import GeoTransformer
-    from hybridreg.learned.stages.lgr import Lgr
-    from hybridreg.learned.stages.omp import Omp
-    from hybridreg.learned.stages.vgam import Vgam
-    from hybridreg.learned.vrhcf.stage import Vrhcf
-    from hybridreg.many.alignment import Alignment
-    from hybridreg.many.register_all import register_all
-    from hybridreg.many.target import Target
-    from hybridreg.matches import Correspondences, Overlap, Pose
-    from hybridreg.pair import LabelledPair, Pair
-    from hybridreg.pipeline import Pipeline, Trace
-    from hybridreg.result import RegistrationResult
-    from hybridreg.scene import Level, Scene
-    from hybridreg.stage import Stage
+if TYPE_CHECKING:  # "X as X" tells type checkers that the name is public
+    from hybridreg.api import read as read
+    from hybridreg.api import register as register
+    from hybridreg.candidates.candidates import Candidates as Candidates
+    from hybridreg.classical.fgr import Fgr as Fgr
+    from hybridreg.classical.fpfh import Fpfh as Fpfh
+    from hybridreg.classical.gicp import Gicp as Gicp
+    from hybridreg.classical.hcf.hcf import Hcf as Hcf
+    from hybridreg.classical.icp import Icp as Icp
+    from hybridreg.classical.kiss import KissMatcher as KissMatcher
+    from hybridreg.classical.kiss_icp import KissIcp as KissIcp
+    from hybridreg.classical.manhattan import Manhattan as Manhattan
+    from hybridreg.classical.nothing import GivenMatches as GivenMatches
+    from hybridreg.classical.nothing import Identity as Identity
+    from hybridreg.classical.nothing import NoMatch as NoMatch
+    from hybridreg.classical.nothing import NoOverlap as NoOverlap
+    from hybridreg.classical.nothing import NoRefinement as NoRefinement
+    from hybridreg.classical.overhead.birdseye import BirdsEye as BirdsEye
+    from hybridreg.classical.overhead.relief_search import ReliefSearch as ReliefSearch
+    from hybridreg.classical.ransac import Ransac as Ransac
+    from hybridreg.classical.ransac_50k import Ransac50k as Ransac50k
+    from hybridreg.classical.sampling import AllPoints as AllPoints
+    from hybridreg.classical.sampling import RandomSample as RandomSample
+    from hybridreg.classical.svd import WeightedSvd as WeightedSvd
+    from hybridreg.classical.visibility import Visibility as Visibility
+    from hybridreg.classical.voxel import VoxelGrid as VoxelGrid
+    from hybridreg.cloud import PointCloud as PointCloud
+    from hybridreg.learned.cofinet.stage import Cofinet as Cofinet
+    from hybridreg.learned.fcgf.stage import Fcgf as Fcgf
+    from hybridreg.learned.omnet.stage import OmNet as OmNet
+    from hybridreg.learned.predator.stage import Predator as Predator
+    from hybridreg.learned.predator.stage import PredatorOverlap as PredatorOverlap
+    from hybridreg.learned.roitr.stage import Roitr as Roitr
+    from hybridreg.learned.stages.dense import DenseFeatures as DenseFeatures
+    from hybridreg.learned.stages.geotransformer import GeoTransformer as GeoTransformer
+    from hybridreg.learned.stages.lgr import Lgr as Lgr
+    from hybridreg.learned.stages.omp import Omp as Omp
+    from hybridreg.learned.stages.vgam import Vgam as Vgam
+    from hybridreg.learned.vrhcf.stage import Vrhcf as Vrhcf
+    from hybridreg.many.alignment import Alignment as Alignment
+    from hybridreg.many.register_all import register_all as register_all
+    from hybridreg.many.target import Target as Target
+    from hybridreg.matches import Correspondences as Correspondences
+    from hybridreg.matches import Overlap as Overlap
+    from hybridreg.matches import Pose as Pose
+    from hybridreg.pair import LabelledPair as LabelledPair
+    from hybridreg.pair import Pair as Pair
+    from hybridreg.pipeline import Pipeline as Pipeline
+    from hybridreg.pipeline import Trace as Trace
+    from hybridreg.result import RegistrationResult as RegistrationResult
+    from hybridreg.scene import Level as Level
+    from hybridreg.scene import Scene as Scene
+    from hybridreg.stage import Stage as Stage
 
 _WHERE = {
     "hybridreg.api": ["read", "register"],

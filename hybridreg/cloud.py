@@ -17,6 +17,7 @@ from hybridreg.geometry import extent
 from hybridreg.geometry.range_image import RangeImage, RangeImages
 from hybridreg.geometry.viewpoint import Given, Seen, found, given
 from hybridreg.io import read_recorded, read_viewpoint
+from hybridreg.io.arrays import array_points
 from hybridreg.io.recorded import ros_messages
 from hybridreg.io.recorded.recording import ANY, Recorded, Selection
 
@@ -187,6 +188,19 @@ class PointCloud:
         if of_point is None:
             return RangeImage.of(self.points, places[0])
         return RangeImages.of(self.points, places, of_point)
+
+
+def rows_of(x: Any, name: str) -> Array:
+    """Every row (N, 3) of what `PointCloud.of` takes, in its own coordinates: few points or missing ones too."""
+    x = getattr(x, "prepared", x)
+    if isinstance(x, PointCloud):
+        rows: Array = x.points + x.offset
+        return rows
+    if isinstance(x, (str, os.PathLike)):
+        return read_recorded(x, ANY).points
+    if isinstance(x, (np.ndarray, list, tuple)):
+        return array_points(np.asarray(x), name)
+    return gate.coordinates(x, name)
 
 
 def _whole_kilometres(points: Array) -> Array:

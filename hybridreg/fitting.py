@@ -102,7 +102,11 @@ def check(pipeline: Pipeline) -> None:
 
 
 def check_stage(where: str, stage: Any) -> None:
-    """Refuse what cannot be called."""
+    """Refuse what cannot be called, and a class in the place of its object."""
+    if isinstance(stage, type):
+        raise ValueError(
+            f"{where}: {stage.__name__} is a class; give an object of it, such as {stage.__name__}()"
+        )
     if not callable(stage):
         raise ValueError(f"{where}: {stage!r} is not a stage; it must be callable")
 
@@ -130,7 +134,10 @@ def check_seed(seed: int) -> None:
 
 
 def check_image(pipeline: Pipeline, pair: Pair) -> None:
-    """Refuse a pair without an image where a stage needs one."""
+    """Refuse what is no pair, and a pair without an image where a stage needs one."""
+    if not isinstance(pair, Pair):
+        cure = "give its pair" if hasattr(pair, "pair") else "hybridreg.Pair.of(source, target) makes one"
+        raise TypeError(f"pair: expected a Pair, got {type(pair).__name__}; {cure}")
     for slot in SLOTS:
         check_stage_image(getattr(pipeline, slot), pair)
 

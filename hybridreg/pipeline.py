@@ -184,7 +184,10 @@ class Pipeline(Stage):
         """
         reset_peak_memory()
         with optional_packages.told("a stage of this pipeline"), one_blas():
-            return self.conclude(self.trace(pair, seed=seed, matches=matches), seed=seed)
+            trace = self.trace(pair, seed=seed, matches=matches)
+            result = self.conclude(trace, seed=seed)
+            trace.scene.release()
+            return result
 
     def conclude(self, trace: Trace, *, seed: int = 0) -> RegistrationResult:
         """The verdict on a traced run, and its result in the user's coordinates."""
@@ -223,6 +226,7 @@ class Pipeline(Stage):
         from hybridreg.evidence.match_agreement import of_most
 
         clock = Clock()
+        fitting.check_image(self, pair)
         if self.prior is not None:
             if matches is not None and self.prior.crop and not isinstance(matches, Correspondences):
                 raise ValueError(
@@ -230,7 +234,6 @@ class Pipeline(Stage):
                 )
             with clock.phase("prior"):
                 pair = self.prior.applied(pair)
-        fitting.check_image(self, pair)
         fitting.check_seed(seed)
         rng = np.random.default_rng([seed, zlib.crc32(pair.id.encode())])
         with clock.phase("downsample"):

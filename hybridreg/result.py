@@ -13,7 +13,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from hybridreg.cloud import PointCloud
+from hybridreg.cloud import rows_of
 from hybridreg.evidence.covariance import of_information
 from hybridreg.geometry import se3
 from hybridreg.geometry.fitness import Overlay
@@ -145,16 +145,10 @@ class RegistrationResult:
     def apply(self, points: Any) -> Array:
         """Points of the source (N, 3), or any cloud that `PointCloud.of` takes, in the target's coordinates: (N, 3).
 
-        Of arrays every row stays, whether finite or not; (3, N) is taken for channels first, as everywhere.
+        Every row stays, however few there are and whether finite or not, so that colours and labels still go with
+        them; (3, N) is taken for channels first, as everywhere.
         """
-        from hybridreg.io.arrays import array_points
-
-        if isinstance(points, (np.ndarray, list, tuple)):
-            rows = array_points(np.asarray(points), "points")
-        else:
-            cloud = PointCloud.of(points, name="points")
-            rows = cloud.points + cloud.offset
-        return se3.apply(self.transformation, rows * self.scale)
+        return se3.apply(self.transformation, rows_of(points, "points") * self.scale)
 
     def format(self, form: str) -> str:
         """The pose as "matrix", "quaternion", "ros-tf", "urdf", "cloudcompare", "kitti" or "tum"; see
@@ -173,10 +167,15 @@ class RegistrationResult:
         return result_words.html(self)
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain numbers, lists and strings; the per-point arrays become their counts. `hybridreg` is the version."""
+        """Plain numbers, lists and strings; the per-point arrays become their counts. `hybridreg` is the version; of
+        `covariance` what is infinite is None."""
         left_out = {"overlay", "matches"}
         plain = {f.name: _plain(getattr(self, f.name)) for f in fields(self) if f.name not in left_out}
         plain |= {name: getattr(self, name) for name in _MEASURED}
+        # JSON has no infinity.
+        plain["covariance"] = [
+            [x if np.isfinite(x) else None for x in row] for row in self.covariance.tolist()
+        ]
         counts = {"n_correspondences": len(self.correspondence_set), "n_matches": len(self.matches)}
         return {**plain, **counts, "hybridreg": _version()}
 

@@ -171,6 +171,14 @@ class Scene:
         value: Value = self._shared[key]
         return value
 
+    def release(self) -> None:
+        """Forget what the stages of a finished run shared. It points back at the scene, so that its memory would
+        otherwise wait for the garbage collector, which comes by the number of objects and not by their size."""
+        self._shared.clear()
+        for scene in self._grids.values():
+            scene.release()
+        self._grids.clear()
+
     def matched(self, found: Correspondences) -> Correspondences:
         """Remember what a matcher found, as evidence for or against every pose."""
         if len(found):

@@ -89,7 +89,8 @@ def from_table(table: Any, slot: str | None = None) -> Any:
         return cls(**_typed(cls, fields, f"{own_slot} stage {name!r}"))
     except TypeError as error:
         known = [f.name for f in dataclasses.fields(cls)] if dataclasses.is_dataclass(cls) else []
-        raise ValueError(f"{own_slot} stage {name!r}: {error}; its fields are {', '.join(known)}") from error
+        has = f"its fields are {', '.join(known)}" if known else "it has no fields"
+        raise ValueError(f"{own_slot} stage {name!r}: {error}; {has}") from error
 
 
 def _typed(cls: type[Any], fields: dict[str, Any], where: str) -> dict[str, Any]:

@@ -32,6 +32,7 @@ class Pretrained(nn.Module):
     sizes : names that `named_config` knows
     loss_names : names of the parts of its losses
     together : whether the examples of a training step are processed at once, joined by `collate`
+    mixed : whether it can be trained in bfloat16: not where distances of points are computed in the network
     validated_with : fields of its stage while it is validated in training
     """
 
@@ -40,6 +41,7 @@ class Pretrained(nn.Module):
     sizes: ClassVar[tuple[str, ...]]
     loss_names: ClassVar[tuple[str, ...]]
     together: ClassVar[bool] = False
+    mixed: ClassVar[bool] = False
     validated_with: ClassVar[Mapping[str, Any]] = {}
     config: Any
 

@@ -86,6 +86,12 @@ def read_config(name_or_folder: str | os.PathLike[str]) -> Any:
     return _read_config(_find(name_or_folder))[1]
 
 
+def read_network(name_or_folder: str | os.PathLike[str]) -> tuple[str, Any]:
+    """A network's name and configuration, without reading its weights; errors as `from_pretrained`."""
+    cls, config = _read_config(_find(name_or_folder))
+    return cls.name, config
+
+
 def _read_config(folder: Path, wanted: str | None = None) -> tuple[type[Pretrained], Any]:
     try:
         name, values = _split(read_json(folder / CONFIG_FILE))

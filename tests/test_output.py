@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import dataclasses
+import json
 import re
 from pathlib import Path
 from typing import Any
@@ -92,6 +93,20 @@ def test_apply_takes_what_register_takes(result: Any, tmp_path: Path) -> None:
         found.apply(np.zeros(4))
 
 
+def test_apply_keeps_every_row(result: Any, tmp_path: Path) -> None:
+    found, pair, _ = result
+    few = pair.source.points[:3].copy()
+    few[1] = np.nan
+    wanted = se3.apply(found.transformation, few)
+    np.save(tmp_path / "few.npy", few)
+    table = {name: few[:, i] for i, name in enumerate("xyz")}
+    records = np.rec.fromarrays(list(few.T), names="x,y,z")
+    for cloud in (few, few.tolist(), table, records, tmp_path / "few.npy"):
+        np.testing.assert_array_equal(found.apply(cloud), wanted)
+    assert found.apply(np.zeros((0, 3))).shape == (0, 3)
+    np.testing.assert_array_equal(found.apply(hr.Target(pair.source)), found.apply(pair.source))
+
+
 def test_words_and_pictures(result: Any) -> None:
     found, pair, _ = result
     text = found.summary()
@@ -114,6 +129,15 @@ def test_words_and_pictures(result: Any) -> None:
     np.testing.assert_allclose(
         clouds["source, aligned"][0], found.apply(pair.source.points[:1])[0], atol=1e-3
     )
+
+
+def test_a_stored_result_holds_the_covariance(result: Any) -> None:
+    found, _, _ = result
+    np.testing.assert_array_equal(json.loads(found.to_json())["covariance"], found.covariance)
+    loose = dataclasses.replace(found, information=np.diag([1.0, 1.0, 0.0, 1.0, 1.0, 1.0]))
+    told = json.loads(loose.to_json(), parse_constant=lambda word: pytest.fail(f"{word} is no JSON"))
+    assert told["covariance"][2][2] is None
+    assert told["covariance"][0] == loose.covariance[0].tolist()
 
 
 def test_covariance_is_that_of_the_information_about_the_centre(result: Any) -> None:

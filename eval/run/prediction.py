@@ -180,6 +180,9 @@ def predict_pair(
             return truth.row(index, labelled, tried, match=getattr(told, "match", None))
         except Exception as error:
             return Row(index=index, id=name, error=f"the answer could not be measured: {one_line(error)}")
+        finally:
+            if tried.trace is not None:
+                tried.trace.scene.release()
 
 
 def _rows(

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from hybridreg.data.yaw_starts import start_of
 from hybridreg.eval.run.row import Row
+from hybridreg.eval.run.store import Predictions
 from hybridreg.eval.score import bootstrap, errors
 from hybridreg.eval.score.errors import Errors, Step
 from hybridreg.eval.score.protocols import INLIER_RADII, RECALL_AT, Protocol
@@ -82,14 +83,24 @@ class Score:
         ]
 
 
-def score(rows: Sequence[Row], protocol: Protocol) -> Score:
-    """Score rows.
+def score(rows: Sequence[Row] | Predictions, protocol: Protocol) -> Score:
+    """Score rows, as `predict` returns them, or what `read` returns.
 
     Raises
     ------
+    TypeError
+        Neither of these, or no protocol.
     ValueError
         No rows, or rows that do not hold what the protocol needs.
     """
+    rows = list(rows.rows if isinstance(rows, Predictions) else rows)
+    wrong = next((row for row in rows if not isinstance(row, Row)), None)
+    if wrong is not None:
+        raise TypeError(
+            f"rows: expected what predict or read returned, got {type(wrong).__name__} among them"
+        )
+    if not isinstance(protocol, Protocol):
+        raise TypeError(f"protocol {protocol!r}: expected one such as hybridreg.eval.protocol('kitti')")
     if not rows:
         raise ValueError("there are no rows to score")
     measured = errors.of(rows)

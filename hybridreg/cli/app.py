@@ -24,6 +24,10 @@ from hybridreg.cli import (
     train,
     view,
 )
+from hybridreg.runtime.garbage import collect_as_usual
+
+# Commands that do one thing and end.
+_SHORT = frozenset({"register", "view", "list", "doctor", "demo"})
 
 app = typer.Typer(
     name="hybridreg",
@@ -42,11 +46,13 @@ def _version(wanted: bool) -> None:
 
 @app.callback()
 def _common(
+    context: typer.Context,
     version: Annotated[
         bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version.")
     ] = False,
 ) -> None:
-    pass
+    if context.invoked_subcommand not in _SHORT:
+        collect_as_usual()
 
 
 app.command("register")(register.command)

@@ -10,7 +10,7 @@ from typing import Annotated
 
 import typer
 
-from hybridreg.cli import options
+from hybridreg.cli import options, outputs
 from hybridreg.cli.terminal.command_line_cures import spoken
 from hybridreg.cli.terminal.error_messages import plainly
 from hybridreg.cli.terminal.stop_signals import going_on
@@ -45,7 +45,7 @@ def command(
     from hybridreg.many.jobs import jobs_of
 
     jobs = jobs_of(what, target)
-    options.check_folder(
+    outputs.check_folder(
         out, WRITTEN, [*what, *(cloud for job in jobs for cloud in (job.source, job.target))]
     )
     with (

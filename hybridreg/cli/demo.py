@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from hybridreg.cli import options
+from hybridreg.cli import options, outputs
 from hybridreg.cli.register import show
 from hybridreg.cli.terminal.error_messages import VERDICT_FAILED, plainly
 from hybridreg.cli.terminal.typed_command import typed
@@ -31,6 +31,7 @@ def command(
     from hybridreg.eval.score import metrics
     from hybridreg.io import write_bytes, write_points
 
+    outputs.check_folder(out)
     method = build(options.changes_of(preset, None, None, None))
     with as_file(files("hybridreg.data").joinpath("demo")) as folder:
         labelled = load_pair(folder)

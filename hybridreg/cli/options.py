@@ -3,8 +3,6 @@
 
 from __future__ import annotations
 
-import os
-from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -76,6 +74,9 @@ CropSource = Annotated[
 Scale = Annotated[bool, typer.Option("--scale", help="The source's size is not known: estimate it.")]
 
 
+_BOX = "the six numbers of a box (lowest x, y, z, then highest)"
+
+
 def prior(
     init: Path | None,
     max_translation: float | None,
@@ -88,10 +89,10 @@ def prior(
     """What of `hybridreg.prior.prior.Prior` the command line tells."""
     region: dict[str, Any] = {}
     if crop is not None:
-        numbers = _numbers(crop, "--crop", (1, 6), "a radius in metres, or the six numbers of a box")
+        numbers = _region(crop, "--crop", (1, 6), f"a radius in metres, or {_BOX}")
         region["radius" if len(numbers) == 1 else "target"] = numbers[0] if len(numbers) == 1 else numbers
     if crop_source is not None:
-        region["source"] = _numbers(crop_source, "--crop-source", (6,), "the six numbers of a box")
+        region["source"] = _region(crop_source, "--crop-source", (6,), _BOX)
     vertical: Any = gravity
     if gravity not in ("known", "unknown", "up"):
         words = "known, unknown, up, or three numbers along the vertical such as 0,1,0"
@@ -105,6 +106,14 @@ def prior(
         "scale": scale or None,
     }
     return {name: value for name, value in told.items() if value is not None}
+
+
+def _region(text: str, option: str, counts: tuple[int, ...], words: str) -> tuple[float, ...]:
+    numbers = _numbers(text, option, counts, words)
+    low, high = ((0.0,), numbers) if len(numbers) == 1 else (numbers[:3], numbers[3:])
+    if not all(a < b for a, b in zip(low, high, strict=True)):
+        raise ValueError(f"{option} {text}: there is nothing inside; give {words}")
+    return numbers
 
 
 def _numbers(text: str, option: str, counts: tuple[int, ...], words: str) -> tuple[float, ...]:
@@ -167,29 +176,6 @@ def both(text: str | None, option: str) -> tuple[str, str]:
             f"{option} {text}: give two names with one comma, such as {option} 'Livox Avia,HDL-64E'"
         )
     return source.strip(), target.strip()
-
-
-def check_cloud_file(path: Path | None, read: Iterable[str | Path] = ()) -> None:
-    """Refuse a file that no cloud is written to, or one of those that are `read`, before the work and not after it."""
-    if path is None:
-        return
-    if path.suffix.lower() not in (".ply", ".pcd"):
-        raise ValueError(f"{path}: clouds are written as .ply or .pcd; choose such a name")
-    if _is_among(path, read):
-        raise ValueError(
-            f"{path}: is one of the clouds that are read, and would be lost; choose another name"
-        )
-
-
-def check_folder(out: Path, written: Iterable[str], read: Iterable[str | Path]) -> None:
-    """Refuse a folder in which a file that is `read` has the name of one that is `written` there."""
-    for path in (out / name for name in written):
-        if _is_among(path, read):
-            raise ValueError(f"{path}: is read, and would be written over; choose another --out")
-
-
-def _is_among(path: Path, read: Iterable[str | Path]) -> bool:
-    return os.path.realpath(path) in map(os.path.realpath, read)
 
 
 def check_form(form: str) -> None:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from hybridreg.cli import options
+from hybridreg.cli import options, outputs
 from hybridreg.cli.terminal.command_line_cures import spoken
 from hybridreg.cli.terminal.error_messages import VERDICT_FAILED, plainly
 from hybridreg.cli.terminal.typed_command import typed
@@ -70,9 +70,11 @@ def command(
     from hybridreg.pair import Pair
 
     options.check_form(form)
-    for path in (aligned, merged):
-        options.check_cloud_file(path, (source, target))
+    outputs.check_folder(out)
+    outputs.check_clouds((aligned, merged), (source, target), out)
     source_sensor, target_sensor = options.both(sensors, "--sensors")
+    if sensors is not None and out is None:
+        raise ValueError(f"--sensors {sensors}: names them in the report; add --out, or leave it out")
     changes = options.changes_of(preset, pipeline, settings, voxel)
     known = options.prior(init, max_translation, max_rotation, gravity, crop, crop_source, scale)
     if known:
@@ -98,6 +100,8 @@ def command(
     pair = Pair.of(clouds[0], clouds[1], image)
     result = method.run(pair, seed=seed)
     show(result, form)
+    if out is not None:
+        out.mkdir(parents=True, exist_ok=True)
     write_clouds(clouds, result, aligned, merged)
     if out is not None:
         from hybridreg.eval.report import single_report

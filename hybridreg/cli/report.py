@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from hybridreg.cli import options
+from hybridreg.cli import options, outputs
 from hybridreg.cli.terminal.error_messages import plainly
 
 if TYPE_CHECKING:
@@ -41,6 +41,7 @@ def command(
         done, names = table_run.of_files(paths), ["cross3dreg", "kitti"]
     chosen = [protocol(name) for name in protocols or names]
     written, pairs = out or folder or Path("runs/report"), _data(done, data)
+    outputs.check_folder(written)
     table_running.write(done, chosen, written, pairs)
     if pictures:
         _draw(done, chosen[0], pairs, written / "pictures", pictures)

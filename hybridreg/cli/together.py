@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from hybridreg.cli import options
+from hybridreg.cli import options, outputs
 from hybridreg.cli.terminal.error_messages import VERDICT_FAILED, plainly
 from hybridreg.cli.terminal.stop_signals import going_on
 
@@ -47,8 +47,8 @@ def command(
 
     options.check_form(form)
     files = files_of(what)
-    options.check_cloud_file(merged, files)
-    options.check_folder(out, WRITTEN, files)
+    outputs.check_folder(out, WRITTEN, files)
+    outputs.check_clouds((merged,), files, out)
     columns = (
         SpinnerColumn(),
         TextColumn("{task.completed:.0f} pairs of {task.description}"),

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from hybridreg.cli import options
+from hybridreg.cli import options, outputs
 from hybridreg.cli.terminal.error_messages import plainly
 
 # Points of a cloud that a phone turns without stuttering: a page of 2 MB.
@@ -50,6 +50,7 @@ def command(
 
     if out is not None and out.suffix.lower() not in (".html", ".htm"):
         raise ValueError(f"--out {out}: the view is a page; choose a name such as {out.stem or 'view'}.html")
+    outputs.check_file(out)
     T = np.eye(4)
     if pose is not None:
         T = se3.rounded(read_pose(pose), str(pose), _ROUNDED)

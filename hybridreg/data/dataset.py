@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import os
 import zlib
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
@@ -52,6 +53,8 @@ class Dataset(Sequence[LabelledPair], ABC):
     def __getitem__(self, index: int | slice) -> LabelledPair | list[LabelledPair]:
         if isinstance(index, slice):
             return [self.load(i) for i in range(*index.indices(len(self)))]
+        if isinstance(index, str):
+            raise TypeError(f"pair {index!r}: pairs have numbers; its own is pairs.ids.index({index!r})")
         if not -len(self) <= index < len(self):
             raise IndexError(f"pair {index} of a data set of {len(self)}")
         return self.load(index % len(self))
@@ -62,17 +65,29 @@ def ids_of(pairs: Sequence[LabelledPair]) -> tuple[str, ...]:
 
     Raises
     ------
+    TypeError
+        No sequence of `LabelledPair`.
     ValueError
         Two pairs with one name, which a resumed run could not tell apart.
     """
+    if isinstance(pairs, (str, os.PathLike)):
+        raise TypeError(f"pairs {os.fspath(pairs)!r}: hybridreg.data.open_dataset(...) opens a data set")
+    if not (hasattr(pairs, "__len__") and hasattr(pairs, "__getitem__")):
+        raise TypeError(f"pairs: expected a data set or a list of LabelledPair, got {type(pairs).__name__}")
     known = getattr(pairs, "ids", None)
-    ids = tuple(known) if known is not None else tuple(labelled.pair.id for labelled in pairs)
+    ids = tuple(known) if known is not None else tuple(map(_id_of, pairs))
     if len(set(ids)) < len(ids):
         double = next(i for i in ids if ids.count(i) > 1)
         raise ValueError(
             f"the data set has {ids.count(double)} pairs called {double!r}; give each its own id"
         )
     return ids
+
+
+def _id_of(labelled: LabelledPair) -> str:
+    if not isinstance(labelled, LabelledPair):
+        raise TypeError(f"pairs: expected LabelledPair, got {type(labelled).__name__} among them")
+    return labelled.pair.id
 
 
 def vouch(pairs: Sequence[LabelledPair]) -> None:

@@ -51,7 +51,7 @@ def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
     OSError
         A full disk, a folder that cannot be written to; it names `path`.
     """
-    target = _writable_target(path)
+    target = check_target(path)
     temporary = target.with_name(f".{secrets.token_hex(8)}{target.suffix}")
     with naming(path, instead_of=temporary), _made(temporary):
         try:
@@ -80,7 +80,8 @@ def write_text(path: str | os.PathLike[str], text: str) -> None:
     write_bytes(path, text.encode("utf-8", "backslashreplace"))
 
 
-def _writable_target(path: str | os.PathLike[str]) -> Path:
+def check_target(path: str | os.PathLike[str]) -> Path:
+    """Where `atomic_path` writes, refused as it would refuse it."""
     target = Path(os.path.realpath(path))
     if target.is_dir():
         raise IsADirectoryError(f"{path}: is a folder; name a file inside it")

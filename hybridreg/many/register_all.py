@@ -61,6 +61,7 @@ def register_all(
         raise ValueError(
             f"voxel={voxel} is a preset's; give the pipeline its own: pipeline.swap(voxel={voxel})"
         )
+    clouds = _listed(clouds)
     told = _names(clouds, names)
     if not is_row(reference, len(clouds)):
         raise ValueError(
@@ -73,6 +74,22 @@ def register_all(
     return aligned(
         held, told, method, ordered=ordered, known=known, reference=reference, seed=seed, workers=workers
     )
+
+
+def _listed(clouds: Any) -> list[Any]:
+    if isinstance(clouds, Mapping):
+        raise ValueError(
+            "clouds: expected a list; give clouds=list(x.values()) and names=list(x) of your mapping x"
+        )
+    if isinstance(clouds, (str, os.PathLike)):
+        raise ValueError(
+            f"clouds: {os.fspath(clouds)!r} is one path, two or more are needed; give a list of them"
+        )
+    if getattr(clouds, "ndim", 3) == 2:
+        raise ValueError(
+            f"clouds: one array of shape {tuple(clouds.shape)}; give a list of two clouds or more"
+        )
+    return list(clouds)
 
 
 def _names(clouds: Sequence[Any], names: Sequence[str] | None) -> tuple[str, ...]:

@@ -22,7 +22,7 @@ from hybridreg.runtime.cores import n_threads
 _VARIABLES = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMEXPR_NUM_THREADS")
 
 
-class _Held:
+class Held:
     """A setting of the whole process: changed by the first block that needs it, restored by the last.
 
     So blocks in several Python threads do not restore each other's values, in whatever order they end.
@@ -114,8 +114,8 @@ def _limit_environment() -> Callable[[], Any]:
 
 # Matrix products of the whole process on one thread for the block. Those of a registration are small: a second thread
 # spent as much time waiting as the first spent on them, and brought nothing.
-one_blas = _Held(_limit_blas)
-_one_torch, _one_said = _Held(_limit_torch), _Held(_limit_environment)
+one_blas = Held(_limit_blas)
+_one_torch, _one_said = Held(_limit_torch), Held(_limit_environment)
 
 
 @contextmanager

@@ -16,6 +16,7 @@ from hybridreg.geometry.consensus import Consensus
 from hybridreg.geometry.kabsch import kabsch
 from hybridreg.matches import Correspondences, Pose
 from hybridreg.runtime.threads import single
+from hybridreg.runtime.torch_settings import as_torch_begins
 from hybridreg.scene import Scene
 from hybridreg.stage import Stage
 
@@ -83,11 +84,9 @@ class Lgr(Stage):
             raise ValueError(f"rival_share={self.rival_share} must lie in [0, 1]")
 
     def __call__(self, scene: Scene, matches: Correspondences, rng: np.random.Generator) -> Pose:
-        import torch  # noqa: F401  (`single` holds what is loaded)
-
         rows = _usable(matches)
         config = self.config(matches.spacing or 2.0 * scene.spacing)
-        with single():
+        with as_torch_begins(), single():
             found = None if len(rows) < 3 else _estimate(scene, matches, rows, config)
             T: Array | None = None if found is None else found.transform.numpy()
             if self.guided:

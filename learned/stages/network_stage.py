@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
 
 from hybridreg.io import shipped_weights
 from hybridreg.runtime.threads import single
+from hybridreg.runtime.torch_settings import as_torch_begins
 from hybridreg.stage import Stage
 
 if TYPE_CHECKING:
@@ -56,6 +57,8 @@ class NetworkStage(Stage):
     def __post_init__(self) -> None:
         if isinstance(self.weights, os.PathLike):
             object.__setattr__(self, "weights", os.fspath(self.weights))
+        if type(self.device).__module__ == "torch":  # a torch.device
+            object.__setattr__(self, "device", str(self.device))
         super().__post_init__()
         if self.weights is not None:
             return
@@ -140,10 +143,10 @@ class NetworkStage(Stage):
     @staticmethod
     @contextmanager
     def inference() -> Iterator[None]:
-        """Without gradients and in one thread (`hybridreg.runtime.threads`): for all that a network does."""
+        """Without gradients, in one thread and as torch begins (`hybridreg.runtime`): for all that a network does."""
         import torch
 
-        with single(), torch.inference_mode():
+        with single(), as_torch_begins(), torch.inference_mode():
             yield
 
     def once(self, scene: Scene, run: Callable[[], Value]) -> Value:

@@ -14,6 +14,7 @@ from hybridreg.learned.network_table import network_class
 from hybridreg.learned.pretrained import Pretrained
 from hybridreg.learned.weights import find_files
 from hybridreg.runtime.threads import single
+from hybridreg.runtime.torch_settings import as_torch_begins
 
 _DEFAULT_SIZE = "nano"
 # Networks held at a time: OMP and a matcher with other weights, each with its predecessor.
@@ -65,11 +66,18 @@ def _load(name: NetworkName, stamp: tuple[int, ...]) -> Loaded:
     if name.device.startswith("cuda") and not torch.cuda.is_available():
         raise ValueError(f"device={name.device!r}: torch finds no GPU here; use device='cpu'")
     # A module draws weights when it is created; the caller's generator must not be affected.
-    with single(), torch.random.fork_rng(devices=[]):
+    with single(), as_torch_begins(), torch.random.fork_rng(devices=[]):
         torch.default_generator.manual_seed(0)
         network = _make(name)
     untrained = network.untrained()
-    return Loaded(network.to(name.device).eval().requires_grad_(False), untrained)
+    try:
+        network = network.to(name.device)
+    except (
+        RuntimeError,
+        NotImplementedError,
+    ) as error:  # too little memory there, or a torch built without it
+        raise ValueError(f"device={name.device!r}: {str(error).splitlines()[0]}; use device='cpu'") from error
+    return Loaded(network.eval().requires_grad_(False), untrained)
 
 
 def _make(name: NetworkName) -> Pretrained:

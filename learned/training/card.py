@@ -89,7 +89,11 @@ def _lines(card: Mapping[str, Any]) -> list[str]:
         "|---" * (len(_FIGURES) + 1) + "|",
     ]
     lines += [
-        f"| {row['title']} | " + " | ".join(row[name] for name in _FIGURES) + " |"
+        f"| {row['title']} | " + " | ".join(_shown(row[name]) for name in _FIGURES) + " |"
         for row in card["validation"]
     ]
     return lines
+
+
+def _shown(figure: str) -> str:
+    return "–" if figure == "nan" else figure

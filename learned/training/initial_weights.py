@@ -39,7 +39,10 @@ def _take_over(network: Pretrained, start: str) -> None:
         reason = "no tensor has a name of this network's"
         if wrong:
             shapes = tuple(found[wrong[0]].shape), tuple(own[wrong[0]].shape)
-            reason = f"tensor {wrong[0]} has shape {shapes[0]}, not {shapes[1]}; choose the network that it belongs to"
+            reason = (
+                f"tensor {wrong[0]} has shape {shapes[0]}, not {shapes[1]}; leave network and size out of the recipe, "
+                "and it takes the network of these weights"
+            )
         raise ValueError(f"start={start!r}: {reason}")
     network.load_state_dict(shared, strict=False)
     fresh = sorted({name.partition(".")[0] for name in own if name not in shared})

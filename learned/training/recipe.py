@@ -158,6 +158,11 @@ class Recipe:
             object.__setattr__(self, "network", config)
         limits.at_least(self, 0, "seed", "every")
         limits.at_least(self, 1, "log_every")
+        if self.precision != "32-true" and not network_class(self.kind).mixed:
+            raise ValueError(
+                f"precision={self.precision!r}: {self.kind} computes distances of points, which need float32; "
+                "choose '32-true'"
+            )
         if not self.phase:
             raise ValueError("a recipe needs at least one [[phase]]")
         known = {source.title for source in self.data.train}

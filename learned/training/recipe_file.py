@@ -16,6 +16,7 @@ from hybridreg.learned.cross3dreg.config import NetworkConfig
 from hybridreg.learned.cross3dreg.sizes import named_config
 from hybridreg.learned.network_table import DEFAULT
 from hybridreg.learned.training.recipe import Phase, Recipe
+from hybridreg.learned.weights import read_network
 
 _NETWORK_KEYS = {"size": "small", "omp": True, "vgam": True}
 
@@ -55,7 +56,8 @@ def parse(table: Mapping[str, Any], *, name: str) -> Recipe:
     """The recipe of a file's content.
 
     ``network`` names the network, or is a table that alters it (with its name as ``name``); ``size``, and for
-    Cross3DReg ``omp`` and ``vgam``, choose its configuration.
+    Cross3DReg ``omp`` and ``vgam``, choose its configuration. With ``start`` and none of these the network is that of
+    the weights.
     """
     known = {each.name for each in dataclasses.fields(Recipe)} - {"kind"} | {"base", *_NETWORK_KEYS}
     if unknown := sorted(set(table) - known):
@@ -68,9 +70,18 @@ def parse(table: Mapping[str, Any], *, name: str) -> Recipe:
     altered = dict(
         value_of(Mapping[str, Any], {"name": given} if isinstance(given, str) else given, "recipe.network")
     )
+    network: Any
     kind = value_of(str, altered.pop("name", DEFAULT), "recipe.network.name")
-    if kind == DEFAULT:
-        network: Any = network_of(base["size"], omp=base["omp"], vgam=base["vgam"], changes=altered)
+    start = value_of(str, table.get("start", ""), "recipe.start")
+    if start and not altered and not set(_NETWORK_KEYS) & set(table):
+        held, network = read_network(start)
+        if "network" in table and kind != held:
+            raise ValueError(
+                f"recipe.start: {start!r} holds weights of the network {held!r}, not of {kind!r}"
+            )
+        kind = held
+    elif kind == DEFAULT:
+        network = network_of(base["size"], omp=base["omp"], vgam=base["vgam"], changes=altered)
     else:
         parts = sorted({"omp", "vgam"} & set(table))
         if parts:

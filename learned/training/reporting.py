@@ -74,9 +74,18 @@ class Reporter:
     def validation(self, found: Sequence[Validation], total: int) -> None:
         """The figures of a validation."""
         for each in found:
+            figures = {
+                f"recall {each.recall:.3f}": each.recall,
+                f"inlier ratio {each.inlier_ratio:.3f}": each.inlier_ratio,
+                f"PIR {each.pir:.3f}": each.pir,
+                f"{each.rre_deg:.2f} deg": each.rre_deg,
+                f"{each.rte_m:.2f} m": each.rte_m,
+                f"mask F1 {each.mask_f1:.3f}": each.mask_f1,
+            }
+            # A network without superpoints has no PIR, one without a mask no F1.
+            told = ", ".join(text for text, value in figures.items() if _told(value))
             self.console.print(
-                f"validation at {total}, {each.title}: recall {each.recall:.3f}, inlier ratio {each.inlier_ratio:.3f}, "
-                f"PIR {each.pir:.3f}, {each.rre_deg:.2f} deg, {each.rte_m:.2f} m, mask F1 {each.mask_f1:.3f}",
+                f"validation at {total}, {each.title}: {told}",
                 highlight=False,
                 soft_wrap=True,
             )

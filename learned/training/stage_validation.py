@@ -84,6 +84,7 @@ def _row(
         trace = pipeline.trace(labelled.pair)
     except ValueError:  # clouds that no pose can be computed from
         return Row(index=number, id=name, T=None, T_true=matrix(truth), n_matches=0, inlier_ratio={})
+    trace.scene.release()
     source, target = np.asarray(trace.matches.source), np.asarray(trace.matches.target)
     ratios = {}
     if protocol is not None:  # an estimator that uses only the clouds has no matches to evaluate

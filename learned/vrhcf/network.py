@@ -91,6 +91,7 @@ class SphereNet(Pretrained):
     """
 
     name: ClassVar[str] = "vrhcf"
+    mixed: ClassVar[bool] = True
     config_type: ClassVar[type] = SphereNetConfig
     sizes: ClassVar[tuple[str, ...]] = tuple(SIZES)
     loss_names: ClassVar[tuple[str, ...]] = ("hardest",)

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import ast
 import json
 import subprocess
 import sys
@@ -50,6 +51,18 @@ def test_every_public_name_exists() -> None:
         assert getattr(hybridreg, name) is not None
     with pytest.raises(AttributeError, match="no attribute 'regster'"):
         _ = hybridreg.regster
+
+
+def test_type_checkers_find_every_public_name() -> None:
+    """A name that a typed package imports without "as" is private to them: `hr.register` was an error."""
+    shown = [
+        alias.name
+        for node in ast.walk(ast.parse(Path(hybridreg.__file__).read_text()))
+        if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("hybridreg.")
+        for alias in node.names
+        if alias.name == alias.asname
+    ]
+    assert sorted([*shown, "__version__"]) == hybridreg.__all__
 
 
 def test_public_names_did_not_vanish() -> None:

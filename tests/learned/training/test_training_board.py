@@ -55,7 +55,12 @@ def test_without_it_and_in_other_processes_there_is_none(
     with Reporter(tmp_path) as reporter:
         assert reporter.board is None
         reporter.line({"total": 7, "phase": "warm-up", "step": 3, "loss": 2.5})
-    assert "warm-up 3: loss 2.5" in capsys.readouterr().err
+        reporter.validation([FOUND], 8)
+    told = capsys.readouterr().err
+    assert "warm-up 3: loss 2.5" in told
+    assert (
+        "validation at 8, near: recall 0.500, inlier ratio 0.250, 1.00 deg, 2.00 m, mask F1 0.750\n" in told
+    ), "what a network does not have is left out"
     Writer.made = []
     monkeypatch.setitem(sys.modules, "torch.utils.tensorboard", SimpleNamespace(SummaryWriter=Writer))
     with Reporter(tmp_path, quiet=True) as reporter:

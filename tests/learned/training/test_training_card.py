@@ -16,7 +16,7 @@ from hybridreg.data import open_dataset
 from hybridreg.data.dataset import fingerprint_of
 from hybridreg.io import shipped_weights
 from hybridreg.learned.training import recipe_file, ship
-from hybridreg.learned.training.card import make_card
+from hybridreg.learned.training.card import make_card, write_card
 from hybridreg.learned.training.checkpoint import Progress
 from hybridreg.learned.training.curve_files import CurveFile
 from hybridreg.learned.training.data.pair_source import open_source
@@ -39,6 +39,13 @@ def test_the_figures_are_those_of_the_run(whole: Run) -> None:
     text = (whole.out / "best" / "card.md").read_text()
     for value in ("8 steps", "seed 3", card["validation"][0]["inlier_ratio"]):
         assert value in text
+
+
+def test_a_figure_that_there_is_none_of_is_a_dash(whole: Run, tmp_path: Path) -> None:
+    card = json.loads((whole.out / "best" / "card.json").read_text())
+    card["validation"][0]["pir"] = "nan"
+    write_card(tmp_path, card)
+    assert card["validation"][0]["inlier_ratio"] + " | – | " in (tmp_path / "card.md").read_text()
 
 
 @pytest.mark.parametrize("name", shipped_weights.names())

@@ -18,8 +18,10 @@ from hybridreg.learned import recipes
 from hybridreg.learned.network_table import network_class
 from hybridreg.learned.training import recipe_file
 from hybridreg.learned.training.data import data_choice
+from hybridreg.learned.training.initial_weights import first_network
 from hybridreg.learned.training.recipe import Phase
 from hybridreg.learned.training.steps.schedule import make_optimizer, rate_at, steps_of
+from hybridreg.learned.weights import read_config
 
 PHASE = {"name": "p", "steps": 2}
 
@@ -44,6 +46,7 @@ PHASE = {"name": "p", "steps": 2}
             r"backbone\.kernel: expected one of 'spatial', 'cyl",
         ),
         ({"precision": "16"}, r"recipe\.precision: expected one of '32-true', 'bf16-mixed'"),
+        ({"precision": "bf16-mixed"}, "cross3dreg computes distances of points, which need float32"),
         ({"phase": []}, r"a recipe needs at least one \[\[phase\]\]"),
         ({"phase": [{"steps": 2}]}, r"recipe\.phase\[0\]: name missing"),
         (
@@ -247,3 +250,32 @@ def test_range_and_height_do_not_go_with_full_rotations() -> None:
     recipe_file.parse({**table, "network": {"vgam": {"point_position": "mlp"}}}, name="r")
     recipe_file.parse({**table, "augmentation": {"rotation": "yaw"}}, name="r")
     recipe_file.parse({**table, "vgam": False}, name="r")
+
+
+PLAIN = {"data": {"train": [{"data": "a"}], "val": [{"data": "b"}]}, "phase": [PHASE]}
+
+
+@pytest.mark.parametrize("start", ["cross3dreg-small", "fcgf-small"])
+def test_a_start_alone_brings_its_network(start: str) -> None:
+    recipe = recipe_file.parse({**PLAIN, "start": start}, name="tuned")
+    assert recipe.kind == start.removesuffix("-small")
+    assert recipe.network == read_config(start)
+    assert "backbone" not in first_network(recipe).untrained()
+
+
+def test_a_start_of_another_network_is_told() -> None:
+    with pytest.raises(
+        ValueError, match="'predator-small' holds weights of the network 'predator', not of 'fcgf'"
+    ):
+        recipe_file.parse({**PLAIN, "network": "fcgf", "start": "predator-small"}, name="tuned")
+
+
+def test_what_the_recipe_says_of_the_network_counts_before_its_start() -> None:
+    recipe = recipe_file.parse({**PLAIN, "size": "nano", "start": "cross3dreg-small"}, name="tuned")
+    assert recipe.network == recipe_file.parse({**PLAIN, "size": "nano"}, name="tuned").network
+    with pytest.raises(ValueError, match="leave network and size out of the recipe"):
+        first_network(recipe)
+
+
+def test_descriptors_of_patches_train_in_bfloat16() -> None:
+    assert recipe_file.parse({**PLAIN, "network": "vrhcf", "precision": "bf16-mixed"}, name="p").precision
