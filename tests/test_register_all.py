@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import json
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,7 @@ from hybridreg.data.loaders.folder import load_pair
 from hybridreg.geometry import se3
 from hybridreg.many import link_search
 from hybridreg.many.links import Link, best_tree, groups, placed
+from hybridreg.many.other_ways import elsewhere
 from hybridreg.runtime.open3d import load_open3d
 
 
@@ -188,10 +190,10 @@ def graph(n: int, wrong: int, seed: int) -> tuple[np.ndarray, list[Link], set[tu
 @pytest.mark.parametrize("wrong", [0, 1, 4, 8])
 def test_the_tree_with_which_most_links_agree(wrong: int, seed: int) -> None:
     truth, links, bad = graph(20, wrong, seed)
-    tree, fit, root = best_tree(20, links, np.zeros((20, 3)), np.random.default_rng(0))
+    tree, fit = best_tree(20, links, np.zeros((20, 3)), np.random.default_rng(0))
     left_out = {(link.source, link.target) for link in links if link not in fit}
     assert left_out == bad
-    poses = placed(20, tree, root)
+    poses = placed(20, tree, 0)
     step = se3.inverse(poses[0]) @ poses
     assert np.linalg.norm(step[:, :3, 3] - truth[:, :3, 3], axis=1).max() < 0.4
 
@@ -201,3 +203,69 @@ def test_groups_that_nothing_joins() -> None:
     some = [link for link in links if (link.source < 5) == (link.target < 5)]
     assert groups(8, some) == [[0, 1, 2, 3, 4], [5, 6, 7]]
     assert np.isnan(placed(8, some[:1], 0)[7]).all()
+    # Each group has a tree of its own, and no link contradicts those of the other.
+    tree, fit = best_tree(8, some, np.zeros((8, 3)), np.random.default_rng(0))
+    assert len(tree) == 6
+    assert fit == some
+
+
+def turned(links: list[Link], cloud: int) -> list[Link]:
+    """Each link of a cloud with a rival at which that cloud is turned by half a turn about its own vertical."""
+    half = se3.yaw(180.0)
+    return [
+        replace(link, verdict="doubtful", rivals=(link.T_target_source @ half)[None])
+        if link.source == cloud
+        else replace(link, verdict="doubtful", rivals=(half @ link.T_target_source)[None])
+        if link.target == cloud
+        else link
+        for link in links
+    ]
+
+
+def test_circles_that_close_in_another_way_too_confirm_nothing() -> None:
+    _, links, _ = graph(6, 0, 0)
+    middles = np.zeros((6, 3))
+
+    def unsure(some: list[Link]) -> list[int]:
+        tree, fit = best_tree(6, some, middles, np.random.default_rng(0))
+        return elsewhere(6, tree, fit, middles, 0)
+
+    assert unsure(links) == []
+    assert unsure(turned(links, 3)) == [3]
+    settled = [
+        replace(link, rivals=np.zeros((0, 4, 4))) if {link.source, link.target} == {3, 4} else link
+        for link in turned(links, 3)
+    ]
+    assert unsure(settled) == []  # one link without a rival decides
+
+
+def test_a_pair_is_as_sure_as_its_link() -> None:
+    _, links, _ = graph(8, 0, 0)
+    link = replace(next(link for link in links if {link.source, link.target} == {0, 1}), role="tree")
+
+    def verdict(word: str) -> str:
+        pair = (replace(link, verdict=word),)
+        return hr.Alignment(
+            names=("a", "b"),
+            poses=np.tile(np.eye(4), (2, 1, 1)),
+            reference=0,
+            links=pair,
+            reasons=(),
+            seconds=0.0,
+        ).verdict
+
+    assert [verdict(word) for word in ("ok", "given", "doubtful")] == ["ok", "ok", "doubtful"]
+
+
+def test_the_reference_may_lie_in_the_smaller_group() -> None:
+    here, truth = tour(2, length=4.0)
+    world = box_world.wood(np.random.default_rng(3))
+    there = [
+        box_world.scan(world, "rings32", box_world.sensor_pose(x, 0, 1.8, 0), np.random.default_rng(4))
+        for x in (0.0, 2.0, 4.0)
+    ]
+    found = hr.register_all([*here, *there], preset="birdseye-gicp")
+    assert found.placed.tolist() == [True, True, False, False, False], found.summary()
+    assert found.verdict == "doubtful"
+    assert off_of(found, [0, 1], truth) < 0.1
+    assert not any("contradicts" in reason for reason in found.reasons)

@@ -106,11 +106,11 @@ class Candidates(Stage):
                 confidence = pose.weighed.confidence
             if confidence >= self.enough:
                 break
-        if confidence < _SURE:
-            with scene.clock.phase("verdict"):
-                shut = shut_out.explanations(scene, beyond, found)
-                mistakes = shut or input_mistakes.explanations(scene, thorough=confidence >= DOUBTED)
-                scene.explanations.extend(mistakes)
+        with scene.clock.phase("verdict"):
+            told = shut_out.explanations(scene, beyond, found, sure=confidence >= self.enough)
+            if not told and confidence < _SURE:
+                told = input_mistakes.explanations(scene, thorough=confidence >= DOUBTED)
+            scene.explanations.extend(told)
         won = found[0].came_from if found else None
         return replace(pose, entries=tuple(trace._replace(won=trace.entry == won) for trace in traces))
 

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -26,9 +27,11 @@ class Alignment:
     reference : int
     links : tuple of Link
         Every pair that was registered, and what became of it.
+    unsure : tuple of int
+        Rows of clouds that may lie elsewhere: where the rivals of doubtful links put them, as many links agree.
     reasons : tuple of str
-        What speaks against the result, by name: links that contradict the others, clouds that are not placed, or that
-        hang on one link which nothing confirms.
+        What speaks against the result, by name: links that contradict the others, clouds that are not placed, that hang
+        on one link which nothing confirms, that have doubtful links only, or that are unsure.
     seconds : float
     """
 
@@ -38,6 +41,7 @@ class Alignment:
     links: tuple[Link, ...]
     reasons: tuple[str, ...]
     seconds: float
+    unsure: tuple[int, ...] = ()
 
     @property
     def placed(self) -> NDArray[np.bool_]:
@@ -46,22 +50,36 @@ class Alignment:
 
     @property
     def verdict(self) -> str:
-        """Of all together: "ok" where every cloud is placed and two links or more confirm it, "failed" where only the
-        reference is placed, else "doubtful"."""
+        """Of all together: "ok" where every cloud is placed by two links or more (of two clouds, by one) that agree, of
+        which one is "ok", and none may lie elsewhere; "failed" where only the reference is placed; else "doubtful"."""
         if self.placed.sum() < 2:
             return "failed"
-        return "ok" if self.placed.all() and not self._hanging() else "doubtful"
+        doubts = self.hanging or self.doubted or self.unsure
+        return "ok" if self.placed.all() and not doubts else "doubtful"
 
-    def _hanging(self) -> list[int]:
-        used = [link for link in self.links if link.role in ("tree", "loop")]
-        counts = np.bincount(
-            [k for link in used for k in (link.source, link.target)], minlength=len(self.names)
-        )
-        return [] if len(self.names) < 3 else [int(k) for k in np.flatnonzero((counts < 2) & self.placed)]
+    @property
+    def hanging(self) -> list[int]:
+        """Placed clouds that hang on one link, where there are more than two clouds."""
+        few = self._links_of(self._used) < 2
+        return [] if len(self.names) < 3 else [int(k) for k in np.flatnonzero(few & self.placed)]
+
+    @property
+    def doubted(self) -> list[int]:
+        """Placed clouds whose links are all doubtful: those may agree because the cloud itself is stretched, say."""
+        none = self._links_of([link for link in self._used if link.verdict in ("ok", "given")]) < 1
+        return [int(k) for k in np.flatnonzero(none & self.placed)]
+
+    @property
+    def _used(self) -> list[Link]:
+        return [link for link in self.links if link.role in ("tree", "loop")]
+
+    def _links_of(self, links: Sequence[Link]) -> NDArray[np.int64]:
+        ends = [k for link in links for k in (link.source, link.target)]
+        return np.bincount(np.array(ends, dtype=np.int64), minlength=len(self.names))
 
     def summary(self) -> str:
         """A few lines to print."""
-        used = sum(link.role in ("tree", "loop") for link in self.links)
+        used = len(self._used)
         lines = [
             f"{self.verdict}: {int(self.placed.sum())} of {len(self.names)} clouds in the frame of "
             f"{self.names[self.reference]}, {used} of {len(self.links)} links agree",

@@ -61,6 +61,7 @@ class LinkFile(dict[Key, Link]):
             "verdict": link.verdict,
             "confidence": link.confidence,
             "metres": link.metres,
+            "rivals": link.rivals.tolist(),
         }
         self._file.add(json.dumps(row))
         super().__setitem__(key, link)
@@ -84,6 +85,7 @@ class LinkFile(dict[Key, Link]):
                 verdict=str(row["verdict"]),
                 confidence=float(row["confidence"]),
                 metres=float(row["metres"]),
+                rivals=np.array(row.get("rivals", []), dtype=np.float64).reshape(-1, 4, 4),
             )
             super().__setitem__((a, b, start), link)
         return True

@@ -17,7 +17,8 @@ from hybridreg.geometry import se3
 from hybridreg.geometry.extent import reach
 from hybridreg.geometry.viewpoint import centre
 from hybridreg.many.alignment import Alignment
-from hybridreg.many.links import Link, agrees, best_tree, groups, placed
+from hybridreg.many.links import Link, agrees, all_placed, best_tree, groups, placed
+from hybridreg.many.other_ways import elsewhere
 from hybridreg.many.overlap_guess import signature, unlike
 from hybridreg.many.pose_graph import optimised
 from hybridreg.pair import Pair
@@ -89,17 +90,18 @@ def aligned(
             break
         run(_across(apart, far, tried()))
     rng = np.random.default_rng([seed, n])
-    tree, fit, root = best_tree(n, _usable(links), middles, rng)
-    poses = placed(n, tree, root)
-    run(_neighbours(held, poses, tried()), poses)
-    tree, fit, root = best_tree(n, _usable(links), middles, rng)
-    poses = _optimised(n, tree, fit, root, reference)
+    tree, _ = best_tree(n, _usable(links), middles, rng)
+    poses = all_placed(n, tree)
+    run((pair for group in groups(n, tree) for pair in _neighbours(held, poses, group, tried())), poses)
+    tree, fit = best_tree(n, _usable(links), middles, rng)
+    poses = _optimised(n, tree, fit, reference)
     links = [replace(link, role=_role(link, tree, fit, poses, middles)) for link in links]
     found = Alignment(
         names=names,
         poses=poses,
         reference=reference,
         links=tuple(links),
+        unsure=tuple(elsewhere(n, tree, fit, middles, reference)),
         reasons=(),
         seconds=time.perf_counter() - start,
     )
@@ -160,6 +162,7 @@ def _linked(
         verdict=result.verdict,
         confidence=result.confidence,
         metres=result.tolerance.metres,
+        rivals=result.rivals,
     )
 
 
@@ -179,28 +182,30 @@ def _across(apart: list[list[int]], far: Array, tried: set[Rows]) -> list[Rows]:
     return pairs
 
 
-def _neighbours(held: Sequence[PointCloud], poses: Array, tried: set[Rows]) -> list[Rows]:
-    # Where each cloud was seen from, in the common frame; its nearest others, as long as both see there.
+def _neighbours(
+    held: Sequence[PointCloud], poses: Array, group: Sequence[int], tried: set[Rows]
+) -> list[Rows]:
+    # Where each cloud of a group was seen from, in its common frame; its nearest others, as long as both see there.
     eyes = np.array(
         [
-            se3.apply(pose, (centre(cloud.points, cloud.viewpoint) + cloud.offset)[None])[0]
-            if np.isfinite(pose).all()
-            else np.full(3, np.nan)
-            for cloud, pose in zip(held, poses, strict=True)
+            se3.apply(poses[k], (centre(held[k].points, held[k].viewpoint) + held[k].offset)[None])[0]
+            for k in group
         ]
     )
-    sees = np.array([reach(cloud.radii) for cloud in held])
+    sees = np.array([reach(held[k].radii) for k in group])
     pairs: list[Rows] = []
-    for k in range(len(held)):
-        away = np.linalg.norm(eyes - eyes[k], axis=1)
-        away[k] = np.nan
-        near = [int(j) for j in np.argsort(away) if away[j] < _NEAR * min(sees[k], sees[j])][:_NEIGHBOURS]
-        pairs += [(k, j) for j in near if (min(k, j), max(k, j)) not in tried]
+    for here, k in enumerate(group):
+        away = np.linalg.norm(eyes - eyes[here], axis=1)
+        away[here] = np.inf
+        near = [int(j) for j in np.argsort(away) if away[j] < _NEAR * min(sees[here], sees[j])][:_NEIGHBOURS]
+        rows = [(k, group[j]) for j in near]
+        pairs += [pair for pair in rows if (min(pair), max(pair)) not in tried]
     return pairs
 
 
-def _optimised(n: int, tree: Sequence[Link], fit: Sequence[Link], root: int, reference: int) -> Array:
-    poses = placed(n, tree, root)
+def _optimised(n: int, tree: Sequence[Link], fit: Sequence[Link], reference: int) -> Array:
+    # Of the clouds that links join to the reference; the others stay out.
+    poses = placed(n, tree, reference)
     rows = np.flatnonzero(np.isfinite(poses[:, 0, 0]))
     row_of = {int(k): place for place, k in enumerate(rows)}
     reached = [link for link in fit if link.source in row_of]
@@ -211,11 +216,7 @@ def _optimised(n: int, tree: Sequence[Link], fit: Sequence[Link], root: int, ref
     loops = in_rows(link for link in reached if link not in tree)
     if len(rows) > 2 and loops:
         own = in_rows(link for link in reached if link in tree)
-        poses[rows] = optimised(poses[rows], own, loops, row_of.get(reference, 0))
-    if not np.isfinite(poses[reference, 0, 0]):  # nothing ties the reference to the others
-        alone = np.full((n, 4, 4), np.nan)
-        alone[reference] = np.eye(4)
-        return alone
+        poses[rows] = optimised(poses[rows], own, loops, row_of[reference])
     moved: Array = se3.inverse(poses[reference]) @ poses
     moved[reference] = np.eye(4)  # to the last bit
     return moved
@@ -224,7 +225,7 @@ def _optimised(n: int, tree: Sequence[Link], fit: Sequence[Link], root: int, ref
 def _role(link: Link, tree: Sequence[Link], fit: Sequence[Link], poses: Array, middles: Array) -> Any:
     if link in tree:
         return "tree"
-    if link in fit and agrees(link, poses, middles):
+    if link in fit and (np.isnan(poses[link.source]).any() or agrees(link, poses, middles)):
         return "loop"
     return "contradicts" if link.confidence >= _TAKES_PART else "failed"
 
@@ -236,5 +237,9 @@ def _reasons(found: Alignment) -> Iterable[str]:
             yield f"{pair} contradicts the other links and was left out"
     for row in np.flatnonzero(~found.placed):
         yield f"{found.names[row]} is not placed: nothing ties it to {found.names[found.reference]}"
-    for k in found._hanging():
+    for k in found.hanging:
         yield f"{found.names[k]} hangs on one link, which nothing confirms"
+    for k in found.doubted:
+        yield f"every link of {found.names[k]} is doubtful: register it with one of the others, and read the reasons"
+    for k in found.unsure:
+        yield f"{found.names[k]} may lie elsewhere: with rivals of doubtful links as many agree"

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
@@ -35,6 +35,8 @@ class Link:
         How far off a right pose may be.
     role : "tree", "loop", "contradicts" or "failed"
         What became of it: "contradicts" disagrees with what most others say together.
+    rivals : (r, 4, 4) float64
+        Other poses that explain both clouds nearly as well.
     """
 
     source: int
@@ -44,6 +46,7 @@ class Link:
     confidence: float
     metres: float
     role: Role = "failed"
+    rivals: Array = field(default_factory=lambda: np.zeros((0, 4, 4)))
 
 
 def placed(n: int, tree: Iterable[Link], root: int) -> Array:
@@ -76,13 +79,14 @@ def agrees(link: Link, poses: Array, middles: Array) -> bool:
 
 def best_tree(
     n: int, links: Sequence[Link], middles: Array, rng: np.random.Generator
-) -> tuple[list[Link], list[Link], int]:
-    """The spanning tree with which the most links agree, those links, and its root.
+) -> tuple[list[Link], list[Link]]:
+    """The spanning tree with which the most links agree, and those links; of clouds that no links join, a tree for each
+    group.
 
     Trees are drawn with the more certain links first, each link as often as its confidence says; one with a wrong link
-    in it disagrees with every circle that the link closes. Of clouds that no links join, the largest group is spanned.
+    in it disagrees with every circle that the link closes.
     """
-    best: tuple[float, list[Link], list[Link], int] = (-1.0, [], [], 0)
+    best: tuple[float, list[Link], list[Link]] = (-1.0, [], [])
     weights = np.array([max(link.confidence, 0.01) for link in links])
     for turn in range(_TREES):
         # Exponential races: an order in which the next link is drawn in proportion to its weight.
@@ -92,13 +96,23 @@ def best_tree(
             else np.argsort(-weights, kind="stable")
         )
         tree = _grown(n, [links[k] for k in order])
-        root = _largest(n, tree)
-        poses = placed(n, tree, root)
+        poses = all_placed(n, tree)
         fit = [link for link in links if agrees(link, poses, middles)]
         value = float(sum(link.confidence for link in fit))
         if value > best[0] + 1e-9:
-            best = (value, [link for link in tree if link in fit], fit, root)
-    return best[1], best[2], best[3]
+            best = (value, tree, fit)
+    return best[1], best[2]
+
+
+def all_placed(n: int, tree: Sequence[Link]) -> Array:
+    """Poses (n, 4, 4), each cloud to the first of the clouds that the tree joins it to."""
+    poses = np.full((n, 4, 4), np.nan)
+    for k in range(n):
+        if np.isnan(poses[k, 0, 0]):
+            here = placed(n, tree, k)
+            reached = np.isfinite(here[:, 0, 0])
+            poses[reached] = here[reached]
+    return poses
 
 
 def _grown(n: int, links: Sequence[Link]) -> list[Link]:
@@ -128,7 +142,3 @@ def groups(n: int, links: Sequence[Link]) -> list[list[int]]:
         found.append([k for k in sorted(left) if np.isfinite(poses[k, 0, 0])])
         left -= set(found[-1])
     return sorted(found, key=lambda group: (-len(group), group[0]))
-
-
-def _largest(n: int, tree: Sequence[Link]) -> int:
-    return groups(n, tree)[0][0]
