@@ -16,7 +16,7 @@ def check_folder(folder: Path | None, written: Iterable[str] = (), read: Iterabl
     one that is `written`."""
     if folder is None:
         return
-    taken = {os.path.realpath(path) for path in read}
+    taken = _real(read)
     for path in (folder / name for name in written):
         if os.path.realpath(path) in taken:
             raise ValueError(f"{path}: is read, and would be written over; choose another --out")
@@ -45,7 +45,7 @@ def check_clouds(
     paths: Iterable[Path | None], read: Iterable[str | Path] = (), out: Path | None = None
 ) -> None:
     """Refuse files that no cloud is written to, that cannot be written, that are `read`, or that are named twice."""
-    taken = {os.path.realpath(path) for path in read}
+    taken = _real(read)
     written: set[str] = set()
     for path in paths:
         if path is None:
@@ -61,3 +61,7 @@ def check_clouds(
             raise ValueError(f"{path}: two clouds would be written to this file; choose another name for one")
         written.add(real)
         check_file(path, out)
+
+
+def _real(paths: Iterable[str | Path]) -> set[str]:
+    return {os.path.realpath(path) for path in paths}

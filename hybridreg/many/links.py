@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Literal
 
@@ -107,11 +107,8 @@ def best_tree(
 def all_placed(n: int, tree: Sequence[Link]) -> Array:
     """Poses (n, 4, 4), each cloud to the first of the clouds that the tree joins it to."""
     poses = np.full((n, 4, 4), np.nan)
-    for k in range(n):
-        if np.isnan(poses[k, 0, 0]):
-            here = placed(n, tree, k)
-            reached = np.isfinite(here[:, 0, 0])
-            poses[reached] = here[reached]
+    for group, here in _each_placed(n, tree):
+        poses[group] = here[group]
     return poses
 
 
@@ -135,10 +132,15 @@ def _grown(n: int, links: Sequence[Link]) -> list[Link]:
 
 def groups(n: int, links: Sequence[Link]) -> list[list[int]]:
     """Clouds that links join, the largest group first."""
-    tree = _grown(n, links)
-    left, found = set(range(n)), []
+    found = [group for group, _ in _each_placed(n, _grown(n, links))]
+    return sorted(found, key=lambda group: (-len(group), group[0]))
+
+
+def _each_placed(n: int, tree: Sequence[Link]) -> Iterator[tuple[list[int], Array]]:
+    # Each group of clouds that a tree joins, and poses (n, 4, 4) to the first of these.
+    left = set(range(n))
     while left:
         poses = placed(n, tree, min(left))
-        found.append([k for k in sorted(left) if np.isfinite(poses[k, 0, 0])])
-        left -= set(found[-1])
-    return sorted(found, key=lambda group: (-len(group), group[0]))
+        group = np.flatnonzero(np.isfinite(poses[:, 0, 0])).tolist()
+        yield group, poses
+        left -= set(group)

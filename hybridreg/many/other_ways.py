@@ -32,40 +32,38 @@ def elsewhere(n: int, tree: Sequence[Link], fit: Sequence[Link], middles: Array,
     poses = placed(n, tree, reference)
     joined = [link for link in fit if np.isfinite(poses[link.source]).all()]
     unsure: set[int] = set()
-    for other in (*_parts_moved(n, tree, joined, poses, reference), *_one_moved(joined, poses, reference)):
+    for part, other in _moved(n, tree, joined, poses, reference):
         if all(_agrees_somehow(link, other, middles) for link in joined):
-            unsure |= {
-                int(k)
-                for k in np.flatnonzero(np.any(other != poses, axis=(1, 2)) & np.isfinite(other[:, 0, 0]))
-            }
+            unsure.update(part)
     return sorted(unsure)
 
 
-def _parts_moved(
+def _moved(
     n: int, tree: Sequence[Link], joined: Sequence[Link], poses: Array, reference: int
-) -> Iterator[Array]:
-    # All that a link of the tree joins to the reference, where a rival of that link puts it.
-    for link in tree:
-        for T in link.rivals if link in joined else ():
-            changed = [replace(each, T_target_source=T) if each is link else each for each in tree]
-            there = placed(n, changed, reference)
-            side = np.isfinite(placed(n, [each for each in tree if each is not link], reference)[:, 0, 0])
-            there[side] = poses[side]
-            yield there
-
-
-def _one_moved(joined: Sequence[Link], poses: Array, reference: int) -> Iterator[Array]:
-    # One cloud where a rival of any of its links puts it.
+) -> Iterator[tuple[list[int], Array]]:
+    # Some clouds where a rival of a link puts them, and all poses then: the cloud at either end of the link, and where
+    # the link is one of the tree, all that it joins to the reference.
     for link in joined:
+        beyond = _beyond(n, tree, link, reference)
         for T in link.rivals:
             for k, there in (
                 (link.source, poses[link.target] @ T),
                 (link.target, poses[link.source] @ se3.inverse(T)),
             ):
-                if k != reference:
+                if k == reference:
+                    continue
+                step = there @ se3.inverse(poses[k])
+                for part in ([k], beyond) if k in beyond else ([k],):
                     other = poses.copy()
-                    other[k] = there
-                    yield other
+                    other[part] = step @ poses[part]
+                    yield part, other
+
+
+def _beyond(n: int, tree: Sequence[Link], link: Link, reference: int) -> list[int]:
+    # The clouds that a link of the tree joins to the reference; none for others.
+    rest = [each for each in tree if each is not link]
+    sides = [np.flatnonzero(np.isfinite(placed(n, rest, k)[:, 0, 0])) for k in (link.source, link.target)]
+    return next((side.tolist() for side in sides if reference not in side), [])
 
 
 def _agrees_somehow(link: Link, poses: Array, middles: Array) -> bool:
