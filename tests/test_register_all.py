@@ -257,6 +257,30 @@ def test_a_pair_is_as_sure_as_its_link() -> None:
     assert [verdict(word) for word in ("ok", "given", "doubtful")] == ["ok", "ok", "doubtful"]
 
 
+@pytest.mark.parametrize(("reference", "doubted"), [(0, [5, 6, 7]), (6, [0, 1, 2, 3, 4])])
+def test_doubtful_links_between_two_groups_confirm_nothing_however_many(
+    reference: int, doubted: list[int]
+) -> None:
+    # Two storeys of one plan lie on one another in each of the links between them.
+    truth, links, _ = graph(8, 0, 0)
+    links = [
+        replace(link, role="tree", verdict="ok" if (link.source < 5) == (link.target < 5) else "doubtful")
+        for link in links
+    ]
+    found = hr.Alignment(
+        names=tuple("abcdefgh"),
+        poses=truth,
+        reference=reference,
+        links=tuple(links),
+        reasons=(),
+        seconds=0.0,
+    )
+    assert found.doubted == doubted
+    assert found.verdict == "doubtful"
+    one_ok = [replace(link, verdict="ok") if {link.source, link.target} == {4, 5} else link for link in links]
+    assert replace(found, links=tuple(one_ok)).verdict == "ok"
+
+
 def test_the_reference_may_lie_in_the_smaller_group() -> None:
     here, truth = tour(2, length=4.0)
     world = box_world.wood(np.random.default_rng(3))

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hybridreg.many.links import Link
+from hybridreg.many.links import Link, groups
 
 Array = NDArray[np.float64]
 
@@ -31,7 +31,7 @@ class Alignment:
         Rows of clouds that may lie elsewhere: where the rivals of doubtful links put them, as many links agree.
     reasons : tuple of str
         What speaks against the result, by name: links that contradict the others, clouds that are not placed, that hang
-        on one link which nothing confirms, that have doubtful links only, or that are unsure.
+        on one link which nothing confirms, that only doubtful links join to the reference, or that are unsure.
     seconds : float
     """
 
@@ -50,8 +50,9 @@ class Alignment:
 
     @property
     def verdict(self) -> str:
-        """Of all together: "ok" where every cloud is placed by two links or more (of two clouds, by one) that agree, of
-        which one is "ok", and none may lie elsewhere; "failed" where only the reference is placed; else "doubtful"."""
+        """Of all together: "ok" where every cloud is placed by two links or more (of two clouds, by one) that agree, a
+        chain of links that are "ok" joins it to the reference, and none may lie elsewhere; "failed" where only the
+        reference is placed; else "doubtful"."""
         if self.placed.sum() < 2:
             return "failed"
         doubts = self.hanging or self.doubted or self.unsure
@@ -65,9 +66,11 @@ class Alignment:
 
     @property
     def doubted(self) -> list[int]:
-        """Placed clouds whose links are all doubtful: those may agree because the cloud itself is stretched, say."""
-        none = self._links_of([link for link in self._used if link.verdict in ("ok", "given")]) < 1
-        return [int(k) for k in np.flatnonzero(none & self.placed)]
+        """Placed clouds that no chain of links that are "ok" joins to the reference. Doubtful links between two groups
+        may all be wrong alike: where the groups are two storeys of one plan, or a cloud is stretched."""
+        sure = [link for link in self._used if link.verdict in ("ok", "given")]
+        joined = next(group for group in groups(len(self.names), sure) if self.reference in group)
+        return [int(k) for k in np.flatnonzero(self.placed) if k not in joined]
 
     @property
     def _used(self) -> list[Link]:

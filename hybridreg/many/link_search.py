@@ -240,6 +240,9 @@ def _reasons(found: Alignment) -> Iterable[str]:
     for k in found.hanging:
         yield f"{found.names[k]} hangs on one link, which nothing confirms"
     for k in found.doubted:
-        yield f"every link of {found.names[k]} is doubtful: register it with one of the others, and read the reasons"
+        yield (
+            f"only doubtful links join {found.names[k]} to {found.names[found.reference]}: "
+            "register it with one of those, and read the reasons"
+        )
     for k in found.unsure:
         yield f"{found.names[k]} may lie elsewhere: with rivals of doubtful links as many agree"
