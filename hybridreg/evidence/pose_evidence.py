@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from hybridreg.evidence import information, scale, stretch
+from hybridreg.evidence import information, scale, stretch, traffic
 from hybridreg.evidence.agreement import Agreement, compare
 from hybridreg.evidence.evidence import Evidence
 from hybridreg.evidence.information import Information
@@ -58,3 +58,8 @@ class PoseEvidence:
     def stretch(self) -> Stretch | None:
         """How the source must be stretched to fit better, if it must."""
         return stretch.stretch(self.views, self.T, self.closeness)
+
+    @cached_property
+    def traffic(self) -> Array | None:
+        """The direction (3,) along which vehicles alone hold the pose, if any."""
+        return traffic.held_along(self.views, self.agreement)

@@ -23,8 +23,8 @@ from hybridreg.scene import Scene
 from hybridreg.search import rivals, settle
 from hybridreg.search.hypothesis import Hypothesis, of_pose
 from hybridreg.search.ranking import best, differs, told_apart
-from hybridreg.verdict import bounds
 from hybridreg.verdict.confidence import CLEAR, DOUBTED, LIKELY, Word, confidence, word
+from hybridreg.verdict.doubts import Doubts, is_right_but_for_size
 from hybridreg.verdict.words import reasons
 
 Array = NDArray[np.float64]
@@ -44,8 +44,7 @@ class Weighed:
     rivals : list of Hypothesis
         Settled, the likeliest first.
     evidence : Evidence
-    slack : Tolerance or None
-        By how much a right pose may well be off, where that is more than the tolerance.
+    doubts : Doubts
     drawn : Tolerance or None
         How far away the surfaces draw the pose to where they fit better, where that decides: beyond the tolerance of
         one that would be "ok", within it of one that would have failed.
@@ -55,7 +54,7 @@ class Weighed:
     at: PoseEvidence
     rivals: list[Hypothesis]
     evidence: Evidence
-    slack: Tolerance | None
+    doubts: Doubts
     drawn: Tolerance | None
     confidence: float
 
@@ -108,14 +107,11 @@ def judge(scene: Scene, pose: Pose, matches: Correspondences) -> Judgement:
         evidence,
         weighed.at.agreement,
         weighed.at.information,
+        weighed.doubts,
         found=pose.found,
         unseen=_unseen(scene),
         explained=bool(scene.explanations),
         started=scene.pair.placed is not None,
-        through_walls=bounds.through_walls(scene, evidence),
-        lone_thing=DOUBTED >= weighed.confidence > FAILED and bounds.is_lone_thing(scene, weighed.at),
-        stretch=weighed.at.stretch if DOUBTED >= weighed.confidence >= FAILED else None,
-        slack=weighed.slack,
         drawn=weighed.drawn,
     )
     return Judgement(
@@ -144,27 +140,23 @@ def weigh(scene: Scene, pose: Pose) -> Weighed:
     own, *found = told_apart([own, *(one for one in offered if scene.pair.allows(one.T))])
     found = best(found)
     evidence = evidence_of(own, found, at.size if pose.found else Size())
-    slack = bounds.slack(scene, at)
-    probability = _believed(scene, at, found, evidence, slack)
+    probability, doubts = _believed(scene, at, found, evidence)
     drawn = None
     if pose.found and not FAILED <= probability <= DOUBTED and not evidence.overturned:
         drawn = _drawn(scene, at, found, ok=probability > DOUBTED)
         probability = (DOUBTED if probability > DOUBTED else FAILED) if drawn else probability
-    return Weighed(at=at, rivals=found, evidence=evidence, slack=slack, drawn=drawn, confidence=probability)
+    return Weighed(at=at, rivals=found, evidence=evidence, doubts=doubts, drawn=drawn, confidence=probability)
 
 
 def _believed(
-    scene: Scene, at: PoseEvidence, found: list[Hypothesis], evidence: Evidence, slack: Tolerance | None
-) -> float:
+    scene: Scene, at: PoseEvidence, found: list[Hypothesis], evidence: Evidence
+) -> tuple[float, Doubts]:
     # The probability by the trees, bounded by what they do not see.
     probability = confidence(evidence)
-    if probability < FAILED and bounds.is_right_but_for_size(scene, at, evidence):
+    if probability < FAILED and is_right_but_for_size(scene, at, evidence):
         probability = FAILED
-    if slack or bounds.through_walls(scene, evidence) or bounds.looks_alike(scene, at, found):
-        return min(probability, DOUBTED)
-    if probability > DOUBTED and (bounds.is_lone_thing(scene, at) or at.stretch is not None):
-        return DOUBTED
-    return probability
+    doubts = Doubts.about(scene, at, found, evidence, likely=probability >= FAILED)
+    return min(probability, DOUBTED) if doubts else probability, doubts
 
 
 def _alone(scene: Scene, at: PoseEvidence, found_by: int = 1) -> Hypothesis:
@@ -195,7 +187,7 @@ def _is_ok(scene: Scene, at: PoseEvidence, found: list[Hypothesis]) -> bool:
     apart = [one.but(closeness=0.0) for one in found if differs(one.T, at.T, centre, spacing)]
     own, *others = told_apart([_alone(scene, at), *apart])
     evidence = evidence_of(own, best(others), at.size)
-    return _believed(scene, at, others, evidence, bounds.slack(scene, at)) >= OK
+    return _believed(scene, at, others, evidence)[0] >= OK
 
 
 def evidence_of(own: Hypothesis, found: list[Hypothesis], size: Size) -> Evidence:

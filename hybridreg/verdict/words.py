@@ -14,6 +14,7 @@ from hybridreg.evidence.information import Information
 from hybridreg.evidence.stretch import Stretch
 from hybridreg.resolution import Tolerance
 from hybridreg.verdict.confidence import CLEAR, LIKELY, SIZE_GAIN, SPARSE, mostly_through
+from hybridreg.verdict.doubts import Doubts
 
 Array = NDArray[np.float64]
 
@@ -34,24 +35,18 @@ def reasons(
     evidence: Evidence,
     agreement: Agreement,
     held: Information,
+    doubts: Doubts,
     *,
     found: bool,
     unseen: Mapping[str, str],
     explained: bool = False,
     started: bool = False,
-    through_walls: bool = False,
-    lone_thing: bool = False,
-    stretch: Stretch | None = None,
-    slack: Tolerance | None = None,
     drawn: Tolerance | None = None,
 ) -> tuple[str, ...]:
     """Why the verdict is what it is; never empty. `unseen` says why the viewpoint of a cloud is unknown.
 
     `explained`: a sentence before these says why no pose was found; `started`: the search began at a given start;
-    `through_walls`: more of the walls of flat scans is seen through than at any right pose; `lone_thing`: one thing is
-    seen from one side; `stretch`: how the source fits better; `slack`: degrees and metres
-    by which a right pose may well be off, where that is more than the tolerance; `drawn`: those by which the surfaces
-    draw it to where they fit better.
+    `drawn`: degrees and metres by which the surfaces draw the pose to where they fit better.
     """
     if not found:
         instead = "the start" if started else "the identity"
@@ -61,10 +56,11 @@ def reasons(
     against = (
         *_elsewhere(drawn),
         *_upside_down(evidence),
-        *_strained(evidence, stretch),
-        *_against(evidence, agreement, held, through_walls),
-        *_from_one_side(lone_thing),
-        *_inexact(slack),
+        *_strained(evidence, doubts.stretch),
+        *_with_traffic(doubts.traffic),
+        *_against(evidence, agreement, held, doubts.through_walls),
+        *_from_one_side(doubts.lone_thing),
+        *_inexact(doubts.slack),
         *_unknown(unseen),
     )
     return (*against, _in_favour(evidence)) if against else (_in_favour(evidence),)
@@ -138,6 +134,15 @@ def _strained(evidence: Evidence, stretch: Stretch | None) -> Iterator[str]:
         yield (
             f"the source fits better when it is multiplied by {scale:.3f}: "
             "is it scaled, or its sensor's calibration off?"
+        )
+
+
+def _with_traffic(direction: Array | None) -> Iterator[str]:
+    if direction is not None:
+        yield (
+            f"along ({_words(direction)}) of the target nothing holds the pose but things no larger than vehicles: if "
+            "they drove on between the scans, the pose follows them; check it by odometry, or take scans where walls, "
+            "signs or bridges face along the road"
         )
 
 

@@ -8,7 +8,17 @@ from dataclasses import replace
 
 import numpy as np
 
-from hybridreg.data.hard import floors, hung, impossible, maps, repeating, rooms, small_things, vehicles
+from hybridreg.data.hard import (
+    floors,
+    hung,
+    impossible,
+    maps,
+    repeating,
+    roads,
+    rooms,
+    small_things,
+    vehicles,
+)
 from hybridreg.data.hard.true_poses import Maker, Sample
 
 _MAKERS: dict[str, Maker] = {
@@ -24,6 +34,7 @@ _MAKERS: dict[str, Maker] = {
     "flat": rooms.flat,
     "tunnel": repeating.tunnel,
     "few": hung.few,
+    "traffic": roads.traffic,
     "rack": repeating.rack,
     "building": floors.building,
     "mirrored": impossible.mirrored,
