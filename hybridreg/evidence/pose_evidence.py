@@ -9,11 +9,12 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from hybridreg.evidence import information, scale, stretch, traffic
+from hybridreg.evidence import information, range_offset, scale, stretch, traffic
 from hybridreg.evidence.agreement import Agreement, compare
 from hybridreg.evidence.evidence import Evidence
 from hybridreg.evidence.information import Information
 from hybridreg.evidence.log_odds import log_odds
+from hybridreg.evidence.range_offset import RangeOffset
 from hybridreg.evidence.scale import Size
 from hybridreg.evidence.stretch import Stretch
 from hybridreg.evidence.surface_distance import closeness
@@ -52,12 +53,17 @@ class PoseEvidence:
     @cached_property
     def size(self) -> Size:
         """The size at which the source fits better, if any."""
-        return scale.size(self.views, self.T, self.closeness)
+        return scale.size(self.views, self.T, self.closeness, self.range_offset)
+
+    @cached_property
+    def range_offset(self) -> RangeOffset | None:
+        """The offset of the source's ranges at which it fits better."""
+        return range_offset.range_offset(self.views, self.T)
 
     @cached_property
     def stretch(self) -> Stretch | None:
         """How the source must be stretched to fit better, if it must."""
-        return stretch.stretch(self.views, self.T, self.closeness)
+        return stretch.stretch(self.views, self.T, self.closeness, self.range_offset)
 
     @cached_property
     def traffic(self) -> Array | None:

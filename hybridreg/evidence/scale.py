@@ -8,8 +8,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from hybridreg.evidence import range_offset
-from hybridreg.evidence.strained import strained
+from hybridreg.evidence.deformed import fit
+from hybridreg.evidence.range_offset import RangeOffset
 from hybridreg.evidence.surface_distance import closeness
 from hybridreg.evidence.views import Views
 from hybridreg.geometry import se3
@@ -37,14 +37,15 @@ class Size(NamedTuple):
     off: Tolerance = Tolerance(0.0, 0.0)
 
 
-def size(views: Views, T_target_source: Array, close: float) -> Size:
-    """Size at which the source fits best about a pose (4, 4) whose closeness is `close`."""
-    fitted = strained(views, T_target_source, _ALIKE)
+def size(views: Views, T_target_source: Array, close: float, offset: RangeOffset | None) -> Size:
+    """Size at which the source fits best about a pose (4, 4) whose closeness is `close`, unless an `offset` of its
+    ranges lets it lie as closely."""
+    fitted = fit(views, T_target_source, _ALIKE).T
     scale = float(np.cbrt(np.linalg.det(fitted[:3, :3])))
     if not _LEAST < abs(np.log(max(scale, 1e-9))) < np.log(_MOST):
         return Size()
     gain = closeness(views.fine, fitted) - close
-    if gain <= 0.0 or (gain > _TOLD and range_offset.explains(views, T_target_source, fitted)):
+    if gain <= 0.0 or (gain > _TOLD and offset is not None and offset.explains(views, fitted)):
         return Size()
     middle = views.middle
     turn = se3.project(fitted[:3, :3])

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""Does the source fit better when it is stretched, or sheared, along the ground?
+"""Does the source fit better when it is stretched, or sheared, along the ground, or when its heights are?
 
 No rigid pose is right then, and the best one is a compromise: of a source stretched by 5 % nearly all points find a
-neighbour, and its middle may lie a metre from where it belongs. Scans taken in motion, maps that drift and axes with
-factors of their own are strained so. Heights are left out: most lie on the ground, and those of right poses often fit
-best when they are strained by several per cent.
+neighbour, and its middle may lie a metre from where it belongs. Scans taken in motion, maps that drift, axes with
+factors of their own and heights in another unit are strained so. Of heights only great strains count: most points lie
+on the ground, and those of right poses often fit best when they are strained by several per cent.
 """
 
 from __future__ import annotations
@@ -14,8 +14,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from hybridreg.evidence import range_offset
-from hybridreg.evidence.strained import strained
+from hybridreg.evidence.deformed import NO_STRAIN, fit
+from hybridreg.evidence.range_offset import RangeOffset
 from hybridreg.evidence.surface_distance import closeness
 from hybridreg.evidence.views import Views
 from hybridreg.geometry import se3
@@ -32,11 +32,13 @@ _FARTHER = 90.0
 _ALIKE = 0.5
 # Factors beyond this are no strain of a scan; by hand.
 _MOST = 0.15
+# Factors of the heights within this are none; of 18 right poses of real pairs none is strained by more than 0.05.
+_HEIGHTS = 0.15
 
 
 class Stretch(NamedTuple):
-    """`factor` by which the source must be stretched along a level `direction` (3,) of the target to fit best, and the
-    one `across` it."""
+    """`factor` by which the source must be stretched along a `direction` (3,) of the target to fit best, level or
+    upright, and the one `across` it on the level."""
 
     factor: float
     direction: Array
@@ -49,24 +51,40 @@ class Stretch(NamedTuple):
         return bool(least / most > _ALIKE)
 
 
-def stretch(views: Views, T_target_source: Array, close: float) -> Stretch | None:
-    """The stretch about a pose (4, 4) whose closeness is `close`; None where it fits hardly better, or neither cloud
-    shows its ground."""
+def stretch(views: Views, T_target_source: Array, close: float, offset: RangeOffset | None) -> Stretch | None:
+    """The stretch about a pose (4, 4) whose closeness is `close`; None where it fits hardly better, an `offset` of its
+    ranges lets it lie as closely, or neither cloud shows its ground."""
     up = _up(views, T_target_source)
     if up is None:
         return None
-    fitted = strained(views, T_target_source, _level(up))
-    A = fitted[:3, :3]
-    left = A @ se3.project(A).T
-    factors, directions = np.linalg.eigh((left + left.T) / 2.0)
+    for strains, read in ((_level(up), _along_the_ground), (np.outer(up, up)[None], _of_heights)):
+        fitted = fit(views, T_target_source, strains).T
+        left = fitted[:3, :3] @ se3.project(fitted[:3, :3]).T
+        found = read(views, up, (left + left.T) / 2.0)
+        if found is None or not closeness(views.fine, fitted) - close >= _GAIN:
+            continue
+        moved = closeness(
+            views.fine, fit(views, T_target_source, NO_STRAIN).T
+        )  # what a pose near by gains too
+        explained = offset is not None and offset.explains(views, fitted)
+        if closeness(views.fine, fitted) - moved >= _GAIN and not explained:
+            return found
+    return None
+
+
+def _along_the_ground(views: Views, up: Array, strain: Array) -> Stretch | None:
+    factors, directions = np.linalg.eigh(strain)
     level = np.argsort(np.abs(up @ directions))[:2]
     k, across = level[np.argsort(-np.abs(factors[level] - 1.0))]
-    strain = abs(factors[k] - 1.0)
-    if strain > _MOST or strain * _reach(views) < _HARM or closeness(views.fine, fitted) - close < _GAIN:
-        return None
-    if range_offset.explains(views, T_target_source, fitted):
+    most = abs(factors[k] - 1.0)
+    if most > _MOST or most * _reach(views) < _HARM:
         return None
     return Stretch(float(factors[k]), directions[:, k], float(factors[across]))
+
+
+def _of_heights(views: Views, up: Array, strain: Array) -> Stretch | None:
+    factor = float(up @ strain @ up)
+    return Stretch(factor, up, 1.0) if abs(factor - 1.0) > _HEIGHTS else None
 
 
 def _reach(views: Views) -> float:

@@ -35,7 +35,6 @@ def descend(
     points: Array,
     surfaces: Planes,
     steps: Iterable[tuple[float, float]],
-    strains: Array | None = None,
 ) -> Array:
     """Poses (..., 4, 4) that steps of point-to-plane ICP reach from T, until too few `points` (n, 3) have a
     correspondence.
@@ -44,9 +43,6 @@ def descend(
     ----------
     steps : pairs of float
         Maximum correspondence distance and width of the weights, metres, of each step.
-    strains : (k, 3, 3), optional
-        Symmetric matrices whose combination is fitted too, in the frame of the surfaces: the poses then scale (where
-        the identity is one of them) or stretch the points.
     """
     poses = np.array(T, dtype=np.float64).reshape(-1, 4, 4)
     moving = np.arange(len(poses))
@@ -60,34 +56,26 @@ def descend(
         if len(moving) == 0:
             break
         row = np.where(hit, match[enough], 0)
-        step = _step_onto(surfaces.points[row], surfaces.facing(row), moved, hit, width, strains)
+        step = _step_onto(surfaces.points[row], surfaces.facing(row), moved, hit, width)
         poses[moving] = step @ poses[moving]
     return poses.reshape(np.shape(T))
 
 
-def _step_onto(
-    planes: Array, normals: Array, points: Array, hit: Mask, width: float, strains: Array | None
-) -> Array:
+def _step_onto(planes: Array, normals: Array, points: Array, hit: Mask, width: float) -> Array:
     """Motions (b, 4, 4) of one step of point-to-plane ICP that move those `points` (b, n, 3) that `hit` (b, n) marks
-    towards the `planes` through points (b, n, 3) with `normals` (b, n, 3), and strain them.
+    towards the `planes` through points (b, n, 3) with `normals` (b, n, 3).
 
     Cauchy weights of `width` metres: at a wrong guess half of the nearest neighbours are not true correspondences.
     """
     gap = np.einsum("bni,bni->bn", points - planes, normals)
     weight = hit / (1.0 + (gap / width) ** 2)
     centre = np.einsum("bn,bni->bi", hit, points) / np.count_nonzero(hit, axis=1)[:, None]
-    arms = points - centre[:, None]
-    J = jacobian(arms, normals)
-    if strains is not None:
-        J = np.concatenate([J, np.einsum("bni,kij,bnj->bnk", normals, strains, arms, optimize=True)], axis=-1)
+    J = jacobian(points - centre[:, None], normals)
     weighted = np.swapaxes(J * weight[..., None], 1, 2)
     H = weighted @ J
-    damping = 1e-6 * np.trace(H, axis1=1, axis2=2)[:, None, None] * np.eye(J.shape[-1])
+    damping = 1e-6 * np.trace(H, axis1=1, axis2=2)[:, None, None] * np.eye(6)
     x = -np.linalg.solve(H + damping, weighted @ gap[..., None])[..., 0]
-    R = se3.rotation_about(x[:, :3])
-    if strains is not None:
-        R = R @ (np.eye(3) + np.einsum("bk,kij->bij", x[:, 6:], strains))
-    return se3.about(centre, R, x[:, 3:6])
+    return se3.about(centre, se3.rotation_about(x[:, :3]), x[:, 3:])
 
 
 def jacobian(arms: Array, normals: Array) -> Array:

@@ -13,9 +13,10 @@ from hybridreg.evidence.covariance import of_information
 from hybridreg.evidence.evidence import Evidence
 from hybridreg.evidence.log_odds import FAILED
 from hybridreg.evidence.pose_evidence import PoseEvidence
+from hybridreg.evidence.range_offset import RangeOffset
 from hybridreg.evidence.stretch import Stretch
 from hybridreg.geometry.ground_relief import TELLS
-from hybridreg.resolution import Tolerance, tolerance
+from hybridreg.resolution import VEHICLES, Tolerance, tolerance
 from hybridreg.scene import Scene
 from hybridreg.search.hypothesis import Hypothesis
 from hybridreg.verdict.confidence import SIZE_GAIN, confidence
@@ -49,6 +50,8 @@ class Doubts:
         One thing is seen from one side, and nothing known beforehand excludes the opposite side.
     stretch : Stretch or None
         How the source fits better.
+    range_offset : RangeOffset or None
+        The offset of its ranges at which it fits clearly better; no doubt where that lies within the tolerance.
     traffic : (3,) float64 or None
         Direction along which vehicles alone hold the pose.
     """
@@ -58,11 +61,13 @@ class Doubts:
     alike: bool
     lone_thing: bool = False
     stretch: Stretch | None = None
+    range_offset: RangeOffset | None = None
     traffic: Array | None = None
 
     def __bool__(self) -> bool:
-        doubts = (self.slack, self.stretch, self.traffic)
-        return self.through_walls or self.alike or self.lone_thing or any(one is not None for one in doubts)
+        found = any(one is not None for one in (self.slack, self.stretch, self.traffic))
+        beyond = self.range_offset is not None and self.range_offset.beyond
+        return self.through_walls or self.alike or self.lone_thing or found or beyond
 
     @classmethod
     def about(
@@ -77,12 +82,15 @@ class Doubts:
         )
         if not likely:
             return quick
-        opposite = lone_thing.opposite(scene, at)
+        opposite, offset = lone_thing.opposite(scene, at), at.range_offset
+        strained = at.stretch is not None or evidence.size_gain > SIZE_GAIN
+        on_a_road = tolerance(scene.pair.source, scene.pair.target) == VEHICLES and not scene.pair.drawn
         return replace(
             quick,
             lone_thing=opposite is not None and scene.pair.allows(opposite),
             stretch=at.stretch,
-            traffic=at.traffic,
+            range_offset=offset if offset is not None and offset.told and not strained else None,
+            traffic=at.traffic if on_a_road else None,
         )
 
 

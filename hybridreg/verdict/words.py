@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from hybridreg.evidence.agreement import Agreement
 from hybridreg.evidence.evidence import Evidence
 from hybridreg.evidence.information import Information
+from hybridreg.evidence.range_offset import RangeOffset
 from hybridreg.evidence.stretch import Stretch
 from hybridreg.resolution import Tolerance
 from hybridreg.verdict.confidence import CLEAR, LIKELY, SIZE_GAIN, SPARSE, mostly_through
@@ -57,6 +58,7 @@ def reasons(
         *_elsewhere(drawn),
         *_upside_down(evidence),
         *_strained(evidence, doubts.stretch),
+        *_off_in_range(doubts.range_offset),
         *_with_traffic(doubts.traffic),
         *_against(evidence, agreement, held, doubts.through_walls),
         *_from_one_side(doubts.lone_thing),
@@ -127,13 +129,23 @@ def _strained(evidence: Evidence, stretch: Stretch | None) -> Iterator[str]:
         yield (
             f"the source fits better when it is stretched by {100.0 * (stretch.factor - 1.0):+.1f} % along "
             f"({_words(stretch.direction)}) of the target, so no rigid pose is right: was it taken in motion, is an "
-            "axis scaled, or does the map bend? Undo that first, or register a smaller part"
+            "axis in another unit, or does the map bend? Undo that first, or register a smaller part"
         )
     elif stretch or resized:
         scale = evidence.scale if resized or not stretch else 0.5 * (stretch.factor + stretch.across)
         yield (
             f"the source fits better when it is multiplied by {scale:.3f}: "
             "is it scaled, or its sensor's calibration off?"
+        )
+
+
+def _off_in_range(offset: RangeOffset | None) -> Iterator[str]:
+    if offset is not None:
+        than = "longer" if offset.metres > 0.0 else "shorter"
+        harm = ", and the pose moves by more than the tolerance then" if offset.beyond else ""
+        yield (
+            f"the source fits better when all its ranges are {abs(offset.metres):.2f} m {than}{harm}: is the range "
+            "offset of one of the sensors calibrated?"
         )
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A source that is stretched or sheared along the ground has no right pose, and none of its poses is "ok"."""
+"""A source that is stretched, sheared, or has all ranges off is told, and no pose is "ok" that is wrong so."""
 
 from __future__ import annotations
 
@@ -12,9 +12,11 @@ from numpy.typing import NDArray
 
 import hybridreg as hr
 from hybridreg.classical.voxel import VoxelGrid
+from hybridreg.data.loaders.folder import load_pair
 from hybridreg.evidence import views
 from hybridreg.evidence.pose_evidence import PoseEvidence
 from hybridreg.evidence.stretch import Stretch
+from hybridreg.geometry import se3
 from hybridreg.pair import Pair
 
 Array = NDArray[np.float64]
@@ -49,7 +51,7 @@ def test_what_fits_as_it_is_is_not_stretched(crossing: Made, fan: Made, corridor
         assert evidence(made, np.eye(3)).stretch is None
 
 
-def test_heights_are_left_out_and_a_size_is_told_as_one(crossing: Made) -> None:
+def test_small_strains_of_heights_are_left_out_and_a_size_is_told_as_one(crossing: Made) -> None:
     assert evidence(crossing, np.diag([1.0, 1.0, 1.06])).stretch is None
     sized = evidence(crossing, 1.04 * np.eye(3)).stretch
     assert sized is not None
@@ -74,3 +76,42 @@ def test_real_pairs(real_data: Path, name: str) -> None:
     source, target = (np.load(real_data / name / f"{side}.npz")["xyz"] for side in ("source", "target"))
     assert hr.register(source, target).verdict == "ok"
     assert hr.register(source * [1.05, 1.0, 1.0], target).verdict != "ok"
+
+
+@pytest.mark.parametrize("factor", [0.5, 1.5, 1 / 0.3048])
+@pytest.mark.parametrize("name", ["kitti-odo-5-to-0", "sustech-970-to-965"])
+def test_heights_in_another_unit_are_told(real_data: Path, name: str, factor: float) -> None:
+    pair = load_pair(real_data / name)
+    source = pair.pair.source.points * [1.0, 1.0, factor]
+    result = hr.register(source, pair.pair.target.points)
+    assert result.verdict != "ok"
+    if result.verdict == "doubtful":
+        assert "an axis in another unit" in " ".join(result.reasons)
+
+
+@pytest.mark.parametrize("metres", [1.0, 0.5, -0.5])
+@pytest.mark.parametrize("name", ["kitti-city-20-to-0", "opencalib-hesai1-qt202-to-p64"])
+def test_an_offset_of_all_ranges_is_told_and_beyond_the_tolerance_not_ok(
+    real_data: Path, name: str, metres: float
+) -> None:
+    made = load_pair(real_data / name)
+    points = made.pair.source.points
+    source = points * (1.0 + metres / np.linalg.norm(points, axis=1, keepdims=True))
+    result = hr.register(source, made.pair.target.points)
+    step = result.transformation @ se3.inverse(made.T_target_source)
+    middle = se3.apply(made.T_target_source, np.median(points, axis=0)[None])
+    off = float(np.linalg.norm(se3.apply(step, middle) - middle))
+    assert off < result.tolerance.metres or result.verdict != "ok"
+    told = [reason for reason in result.reasons if "all its ranges are" in reason]
+    assert told or result.verdict == "failed"
+    if told:
+        assert ("shorter" in told[0]) == (metres > 0.0)
+        assert float(told[0].split(" are ")[1].split(" m ")[0]) == pytest.approx(abs(metres), abs=0.06)
+
+
+def test_what_is_right_has_no_offset(crossing: Made, fan: Made, corridor: Made) -> None:
+    for made in (crossing, fan, corridor):
+        found = evidence(made, np.eye(3)).range_offset
+        assert found is not None
+        assert not found.told
+        assert not found.beyond
