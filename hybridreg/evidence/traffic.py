@@ -35,6 +35,8 @@ _SHARE = 0.1
 _FEW = 20.0
 # Points of vehicles that hold it, and vehicles, at least; by hand.
 _POINTS, _VEHICLES = 40, 3
+# Metres along the road over which they are spread, at least: in a room walls are no larger than lorries; by hand.
+_SPREAD = 20.0
 # Nats from which the ground's relief holds the pose by itself: of a made motorway with relief that nearly repeats 77 at
 # a wrong pose, of real roads some hundreds at the right one; by hand.
 _TELLS = 100.0
@@ -49,16 +51,21 @@ def held_along(views: Views, agreement: Agreement) -> Array | None:
     if up is None or agreement.relief.information > _TELLS:
         return None
     source, target = views.source, views.target
-    normals, things = [], []
-    for view, way, facing, after in (
-        (source, agreement.source, agreement.source.normals, 0),
-        (target, agreement.target, target.normals[target.asked], len(source.points)),
+    rows = []
+    for view, way, points, facing, after in (
+        (source, agreement.source, agreement.source.moved, agreement.source.normals, 0),
+        (
+            target,
+            agreement.target,
+            target.points[target.asked],
+            target.normals[target.asked],
+            len(source.points),
+        ),
     ):
         thing = views.scene.shared(("things", after > 0), partial(_things, view))[view.asked]
         holds = way.looked & way.agrees & (thing != _GROUND) & (np.abs(facing @ up) < _LEVEL)
-        normals.append(facing[holds])
-        things.append(np.where(thing[holds] > 0, thing[holds] + after, _FIXED))
-    facing, thing = np.concatenate(normals), np.concatenate(things)
+        rows.append((points[holds], facing[holds], np.where(thing > 0, thing + after, _FIXED)[holds]))
+    points, facing, thing = (np.concatenate(parts) for parts in zip(*rows, strict=True))
     still = thing == _FIXED
     level = views.target.ground.levelling[:2]  # type: ignore[union-attr]
     flat = facing @ level.T
@@ -66,9 +73,11 @@ def held_along(views: Views, agreement: Agreement) -> Array | None:
     held = (flat @ along) ** 2
     holds = held > _FACING**2
     fixed, moving = held[holds & still].sum(), held[holds & ~still].sum()
-    vehicles = np.unique(thing[holds & ~still])
-    few = moving < _POINTS or len(vehicles) < 2 * _VEHICLES  # each is seen by both sensors
-    return None if few or fixed > min(_SHARE * moving, _FEW) else along @ level
+    if moving < _POINTS or fixed > min(_SHARE * moving, _FEW):
+        return None
+    vehicles, places = np.unique(thing[holds & ~still]), points[holds & ~still] @ level.T @ along
+    many = len(vehicles) >= 2 * _VEHICLES and np.ptp(places) > _SPREAD  # each is seen by both sensors
+    return along @ level if many else None
 
 
 def _things(view: View) -> Rows:

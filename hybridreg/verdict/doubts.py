@@ -16,7 +16,7 @@ from hybridreg.evidence.pose_evidence import PoseEvidence
 from hybridreg.evidence.range_offset import RangeOffset
 from hybridreg.evidence.stretch import Stretch
 from hybridreg.geometry.ground_relief import TELLS
-from hybridreg.resolution import VEHICLES, Tolerance, tolerance
+from hybridreg.resolution import Tolerance, tolerance
 from hybridreg.scene import Scene
 from hybridreg.search.hypothesis import Hypothesis
 from hybridreg.verdict.confidence import SIZE_GAIN, confidence
@@ -84,13 +84,12 @@ class Doubts:
             return quick
         opposite, offset = lone_thing.opposite(scene, at), at.range_offset
         strained = at.stretch is not None or evidence.size_gain > SIZE_GAIN
-        on_a_road = tolerance(scene.pair.source, scene.pair.target) == VEHICLES and not scene.pair.drawn
         return replace(
             quick,
             lone_thing=opposite is not None and scene.pair.allows(opposite),
             stretch=at.stretch,
             range_offset=offset if offset is not None and offset.told and not strained else None,
-            traffic=at.traffic if on_a_road else None,
+            traffic=None if scene.pair.drawn else at.traffic,
         )
 
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from hybridreg.data.hard import floors, hung, maps, rooms, small_things, vehicles
+from hybridreg.data.hard import hung, maps, rooms, small_things, vehicles
 from hybridreg.data.hard.true_poses import Array, Maker, Sample
 from hybridreg.geometry import se3
 
@@ -64,7 +64,7 @@ def disjoint(rng: np.random.Generator, seed: int) -> Sample:
     """Source and target of two different worlds of one kind."""
     makes = (
         hung.plain, hung.crop, hung.crop, hung.tilt, maps.map_ground, maps.map_sensor, vehicles.base_link,
-        vehicles.several, rooms.depth_room, rooms.lidars, rooms.flat, floors.building, small_things.thing,
+        vehicles.several, rooms.depth_room, rooms.lidars, rooms.flat, maps.building, small_things.thing,
         small_things.thing,
     )  # fmt: skip
     make = makes[rng.integers(len(makes))]

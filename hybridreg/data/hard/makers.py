@@ -9,7 +9,6 @@ from dataclasses import replace
 import numpy as np
 
 from hybridreg.data.hard import (
-    floors,
     hung,
     impossible,
     maps,
@@ -36,7 +35,7 @@ _MAKERS: dict[str, Maker] = {
     "few": hung.few,
     "traffic": roads.traffic,
     "rack": repeating.rack,
-    "building": floors.building,
+    "building": maps.building,
     "mirrored": impossible.mirrored,
     "scaled": impossible.scaled,
     "strained": impossible.strained,

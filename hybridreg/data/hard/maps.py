@@ -1,19 +1,25 @@
 # SPDX-License-Identifier: MIT
-"""Fused maps of many stops against a scan, in frames whose origin is a sensor's position or not."""
+"""Fused maps of many stops, outdoors or of a floor of several rooms, against a scan; the origin of their frames is a
+sensor's position or not."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
 
+from hybridreg.data.hard import rooms
+from hybridreg.data.hard.indoors import floor, stand_in
 from hybridreg.data.hard.outdoors import outdoors
 from hybridreg.data.hard.outings import GRAIN, METRES, base, mount, next_to
 from hybridreg.data.hard.place import Place
-from hybridreg.data.hard.shared_surface import judged
-from hybridreg.data.hard.sights import AROUND, LIDARS, Shot, lidar, look, merged, pose, thin
+from hybridreg.data.hard.shared_surface import Bar, judged
+from hybridreg.data.hard.sights import AROUND, LIDARS, Shot, level, lidar, look, merged, pose, thin
 from hybridreg.data.hard.true_poses import Sample
+from hybridreg.geometry import se3
 
 Array = NDArray[np.float64]
+# One room among many must be distinguishable from the others.
+_ROOM = Bar(facing=100.0, drop=0.12)
 
 
 def map_ground(rng: np.random.Generator, seed: int) -> Sample:
@@ -69,3 +75,34 @@ def _frame(place: Place, fused: Shot, rng: np.random.Generator) -> Array:
     ground = float(place.height(x, y))
     lift = {"on": 0.0, "in": -rng.uniform(0, 0.2), "over": rng.uniform(0, 0.2), "below": -rng.uniform(1, 8)}
     return pose(x, y, ground + lift[str(where)], yaw)
+
+
+def building(rng: np.random.Generator, seed: int) -> Sample:
+    """A scan in one room against the map of the whole floor, thinned to 5 to 10 cm."""
+    place, halls = floor(rng)
+    world, height = place.world(), rng.uniform(0.8, 1.6)
+    rays = lidar("hemisphere" if rng.random() < 0.5 else "rings32", rng, far=30.0, columns=500)
+    corridor = halls[-1]
+    along = np.arange(-corridor.half_x + 1.5, corridor.half_x - 1.0, 4.0)
+    stops = [(float(x), 0.0) for x in along] + [stand_in(place, here, rng) for here in halls[:-1]]
+    shots = [look(world, rays, level(rng, x, y, height), rng) for x, y in stops]
+    frame = {
+        "first": shots[0].T_world,
+        "floor": pose(stops[0][0], stops[0][1], rng.uniform(-0.05, 0.05), rng.uniform(0, 360)),
+        "corner": pose(-corridor.half_x, min(r.y - r.half_y for r in halls), 0.0, rng.choice([0.0, 90.0])),
+    }[str(rng.choice(["first", "floor", "corner"]))]
+    fused = thin(merged(shots, frame), rng.uniform(0.05, 0.1))
+    here = halls[rng.integers(len(halls) - 1)]
+    name = str(rng.choice(LIDARS if rng.random() < 0.4 else AROUND))
+    x, y = stand_in(place, here, rng)
+    T = level(rng, x, y, rng.uniform(0.6, 1.6))
+    scan = look(world, lidar(name, rng, far=30.0), T, rng)
+    # The same place in every other room is a repetition if the scan fits there as well.
+    rivals = [
+        se3.from_rt(se3.yaw(turn)[:3, :3], np.array([other.x, other.y, 0.0]))
+        @ se3.from_rt(np.eye(3), -np.array([here.x, here.y, 0.0]))
+        for other in halls[:-1]
+        for turn in (0.0, 180.0)
+        if other is not here or turn
+    ]
+    return judged(scan, fused, rooms.METRES, 0.12, rivals, _ROOM)
