@@ -36,7 +36,7 @@ _FEW = 20.0
 # Points of vehicles that hold it, and vehicles, at least; by hand.
 _POINTS, _VEHICLES = 40, 3
 # Metres along the road over which they are spread, at least: in a room walls are no larger than lorries; by hand.
-_SPREAD = 20.0
+_SPREAD = 12.0
 # Nats from which the ground's relief holds the pose by itself: of a made motorway with relief that nearly repeats 77 at
 # a wrong pose, of real roads some hundreds at the right one; by hand.
 _TELLS = 100.0
@@ -97,16 +97,19 @@ def _things(view: View) -> Rows:
     labels, n = ndimage.label(grid, np.ones((3, 3)))
     label = labels[tuple(cells.T)]
     order = np.argsort(label, kind="stable")
-    ends = np.searchsorted(label[order], np.arange(1, n + 2))
-    for k in range(n):
-        part = rows[order[ends[k] : ends[k + 1]]]
-        if _may_drive(places[part], float(height[part].max())):
-            thing[part] = k + 1
+    starts = np.searchsorted(label[order], np.arange(1, n + 1))
+    drives = _may_drive(places[rows][order], height[rows][order], starts)
+    thing[rows] = np.where(drives[label - 1], label, _FIXED)
     return thing
 
 
-def _may_drive(places: Array, top: float) -> bool:
-    centred = places - places.mean(axis=0)
-    wide, long = np.ptp(centred @ np.linalg.eigh(centred.T @ centred)[1], axis=0)
-    post = long < _SHORT and top > _LOW
-    return bool(long < _LONG and wide < _WIDE and top < _TALL and not post)
+def _may_drive(places: Array, heights: Array, starts: Rows) -> NDArray[np.bool_]:
+    # Whether each thing may, by its extent along its own axes; places (n, 2) thing after thing, from `starts` (k,) on.
+    counts = np.diff(np.append(starts, len(places)))
+    centred = places - np.repeat(np.add.reduceat(places, starts) / counts[:, None], counts, axis=0)
+    spread = np.add.reduceat(centred[:, :, None] * centred[:, None, :], starts)
+    along = np.einsum("ni,nij->nj", centred, np.repeat(np.linalg.eigh(spread)[1], counts, axis=0))
+    wide, long = (np.maximum.reduceat(along, starts) - np.minimum.reduceat(along, starts)).T
+    top = np.maximum.reduceat(heights, starts)
+    post = (long < _SHORT) & (top > _LOW)
+    return np.asarray((long < _LONG) & (wide < _WIDE) & (top < _TALL) & ~post)
