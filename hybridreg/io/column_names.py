@@ -44,7 +44,7 @@ def find_axes(names: Sequence[str], name: str) -> Axes | None:
     ValueError
         Several columns fit; one axis is in another unit than the others; an axis is an angle.
     """
-    parsed = [_split(each) for each in names]
+    parsed = [stem_and_unit(each) for each in names]
     stems = [stem for stem, _ in parsed]
     if all(stems.count(axis) == 1 for axis in _AXES):
         return _with_unit((stems.index("x"), stems.index("y"), stems.index("z")), parsed, name)
@@ -71,7 +71,7 @@ def axes_in(names: Sequence[str], name: str) -> Axes:
     found = find_axes(names, name)
     if found is not None:
         return found
-    stems = [_split(each)[0] for each in names]
+    stems = [stem_and_unit(each)[0] for each in names]
     held = shorten(", ".join(map(str, names)), 200)
     if {"lon", "lat"} & {stem[:3] for stem in stems} and "x" not in stems:
         problem = f"its columns {held} are longitudes and latitudes"
@@ -81,8 +81,8 @@ def axes_in(names: Sequence[str], name: str) -> Axes:
     raise fault(name, problem, "name the coordinates x, y and z, each once")
 
 
-def _split(label: str) -> tuple[str, str]:
-    """Lower-case name without quotes, and its unit."""
+def stem_and_unit(label: str) -> tuple[str, str]:
+    """A column's lower-case name without quotes, and its unit."""
     match = _NAME.fullmatch(str(label).strip().strip("\"'").strip().lower())
     if match is None:
         return str(label).lower(), ""

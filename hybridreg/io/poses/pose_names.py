@@ -1,0 +1,55 @@
+# SPDX-License-Identifier: MIT
+"""A pose of one row whose columns a line before it names: which are its position and its quaternion."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from hybridreg.io.column_names import stem_and_unit
+from hybridreg.io.coordinate_systems.length_unit import in_metres
+from hybridreg.io.formats.text_names import lists_in
+from hybridreg.io.meaning.length_units import METRES
+
+_AXES = "xyz"
+
+
+def in_order(row: Sequence[float], before: Sequence[str], name: str) -> list[float] | None:
+    """x y z qx qy qz qw of a row of numbers, by the last of the lines before it that names every column.
+
+    Many tools write w before x, y and z, and say so only there: EuRoC's files, tables of COLMAP's poses. None where no
+    line names a position and a quaternion, or where it is not clear which columns they are.
+    """
+    for line in reversed(before):
+        for names in lists_in(line, None):
+            found = _columns([stem_and_unit(each) for each in names]) if len(names) == len(row) else None
+            if found is not None:
+                position, metres, quaternion = found
+                place = in_metres(np.array([[row[k] for k in position]]), metres, name)
+                return [*place[0].tolist(), *(row[k] for k in quaternion)]
+    return None
+
+
+def _columns(names: Sequence[tuple[str, str]]) -> tuple[list[int], float | None, list[int]] | None:
+    stems = [stem for stem, _ in names]
+    turns = [stem[:-1] for stem in stems if stem.endswith("w") and _together(stems, stem[:-1], _AXES + "w")]
+    if len(turns) != 1:
+        return None
+    quaternion = _together(stems, turns[0], _AXES + "w")
+    places = [
+        columns
+        for stem in stems
+        if stem.endswith("x") and stem[:-1] != turns[0] and (columns := _together(stems, stem[:-1], _AXES))
+    ]
+    if not places:
+        return None
+    # Where velocities and the like stand there too, x, y and z alone are the position, or else what comes first.
+    position = next((each for each in places if stems[each[0]] == "x"), places[0])
+    units = {names[k][1] for k in position}
+    return position, METRES.get(units.pop()) if len(units) == 1 else None, quaternion
+
+
+def _together(stems: Sequence[str], prefix: str, axes: str) -> list[int]:
+    wanted = [prefix + axis for axis in axes]
+    return [stems.index(each) for each in wanted] if all(stems.count(each) == 1 for each in wanted) else []
