@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 from hybridreg.io.faults import fault, shorten
-from hybridreg.io.meaning.length_units import ANGLES, METRES
+from hybridreg.io.meaning.length_units import ANGLES, known_metres
 
 _AXES = ("x", "y", "z")
 # What tools put before or behind an axis: ROS, E57, ParaView, spreadsheets. Not `n` or `v`: normals and velocities.
@@ -22,7 +22,7 @@ _SURVEY = (
     ("northing", "northings", "n", "utm_northing", "utm_n", "utm_y", "y_utm"),
     ("height", "elevation", "elev", "altitude", "h", "u", "z", "utm_z", "z_utm"),
 )
-_NAME = re.compile(r"(.*?)\s*(?:[\[(]([^\])]*)[\])]?|[/|]\s*([^/|]+)|[_ ](mm|cm|dm|m|km|ft))?")
+_NAME = re.compile(r"(.*?)\s*(?:[\[(]([^\])]*)[\])]?|[/|]\s*([^/|]+)|[_ ](mm|cm|dm|m|km|ft|us[_-]?ft|ftus))?")
 
 
 class Axes(NamedTuple):
@@ -126,7 +126,7 @@ def _with_unit(columns: tuple[int, int, int], parsed: Sequence[tuple[str, str]],
     angle = next((unit for unit in units if unit in ANGLES), None)
     if angle is not None:
         raise fault(name, f"its x, y or z is in {angle!r}", "give Cartesian coordinates in metres")
-    metres = [METRES.get(unit, 1.0) for unit in units]
+    metres = [known_metres(unit) or 1.0 for unit in units]
     if len(set(metres)) > 1:
         told = ", ".join(unit or "none" for unit in units)
         raise fault(name, f"the units of its x, y and z differ: {told}", "give all three in one unit")

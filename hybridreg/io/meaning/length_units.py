@@ -17,19 +17,25 @@ from hybridreg.io.faults import fault, shorten
 
 Array = NDArray[np.float64]
 
-METRES = {
+# Without spaces, full stops and hyphens, which are put between the letters in every way.
+_METRES = {
     **dict.fromkeys(("m", "metre", "metres", "meter", "meters"), 1.0),
     **dict.fromkeys(("mm", "millimetre", "millimetres", "millimeter", "millimeters"), 1e-3),
     **dict.fromkeys(("cm", "centimetre", "centimetres", "centimeter", "centimeters"), 1e-2),
     **dict.fromkeys(("dm", "decimetre", "decimetres", "decimeter", "decimeters"), 1e-1),
     **dict.fromkeys(("km", "kilometre", "kilometres", "kilometer", "kilometers"), 1e3),
-    **dict.fromkeys(("ft", "foot", "feet"), 0.3048),
-    **dict.fromkeys(("ftus", "us-ft", "usft", "us survey foot", "us survey feet"), 1200 / 3937),
+    **dict.fromkeys(
+        ("um", "µm", "μm", "micrometre", "micrometres", "micrometer", "micrometers", "micron"), 1e-6
+    ),
+    **dict.fromkeys(("ft", "foot", "feet", "intlft", "internationalfoot", "internationalfeet"), 0.3048),
+    **dict.fromkeys(("ftus", "usft", "usfoot", "usfeet", "sft", "surveyfoot", "surveyfeet"), 1200 / 3937),
+    **dict.fromkeys(("ussurveyft", "ussurveyfoot", "ussurveyfeet"), 1200 / 3937),
     **dict.fromkeys(("in", "inch", "inches"), 0.0254),
 }
 ANGLES = ("deg", "degree", "degrees", "°", "rad", "radian", "radians")
 
-_WORD = r"(us survey f[oe][oe]t|[a-z°]+(?:-ft)?)"
+_BETWEEN = re.compile(r"[\s._-]+")
+_WORD = r"((?:u\.?s\.?|intl\.?|international)[ -]?(?:survey )?(?:ft|f[oe][oe]t)|[a-zµμ°]+)"
 _SAYS = (
     re.compile(
         rf"(?:([a-z]+)[ _-]+)?(?<![a-z])units?\b\W*(?:(?:is|are|in)\b\W*){{0,2}}{_WORD}", re.IGNORECASE
@@ -98,7 +104,12 @@ def metres_of(word: str, name: str) -> float | None:
         raise fault(
             name, f"the unit of its x, y and z is {shorten(word)}", "give Cartesian coordinates in metres"
         )
-    return METRES.get(lowered)
+    return known_metres(word)
+
+
+def known_metres(word: str) -> float | None:
+    """Metres of a unit of length, None where it is not known."""
+    return _METRES.get(_BETWEEN.sub("", word.lower()))
 
 
 def unit_given(x: Any, name: str) -> float | None:

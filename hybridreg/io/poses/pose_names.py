@@ -10,7 +10,7 @@ import numpy as np
 from hybridreg.io.column_names import stem_and_unit
 from hybridreg.io.coordinate_systems.length_unit import in_metres
 from hybridreg.io.formats.text_names import lists_in
-from hybridreg.io.meaning.length_units import METRES
+from hybridreg.io.meaning.length_units import known_metres
 
 _AXES = "xyz"
 
@@ -47,7 +47,7 @@ def _columns(names: Sequence[tuple[str, str]]) -> tuple[list[int], float | None,
     # Where velocities and the like stand there too, x, y and z alone are the position, or else what comes first.
     position = next((each for each in places if stems[each[0]] == "x"), places[0])
     units = {names[k][1] for k in position}
-    return position, METRES.get(units.pop()) if len(units) == 1 else None, quaternion
+    return position, known_metres(units.pop()) if len(units) == 1 else None, quaternion
 
 
 def _together(stems: Sequence[str], prefix: str, axes: str) -> list[int]:
