@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hybridreg.io.coordinate_systems.length_unit import LengthUnit, in_metres
+from hybridreg.io.coordinate_systems.length_unit import LengthUnit, in_metres, tell_stretch
 from hybridreg.io.coordinate_systems.well_known_text import unit_of_text
 from hybridreg.io.faults import fault, shorten
 
@@ -161,6 +161,7 @@ def as_commented(points: Array, comments: Iterable[str], name: str) -> Array:
                 stacklevel=3,
             )
     unit = unit_in(lines, name) or LengthUnit()
+    tell_stretch(points, unit, name)
     return in_metres(points, unit.across, name, up=unit.up)
 
 
