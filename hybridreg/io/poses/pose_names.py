@@ -3,7 +3,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import re
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -13,6 +14,7 @@ from hybridreg.io.formats.text_names import lists_in
 from hybridreg.io.meaning.length_units import known_metres
 
 _AXES = "xyz"
+_INNER = re.compile(r"[\[(]([^\[\]()]+)[\])]\W*$")
 
 
 def in_order(row: Sequence[float], before: Sequence[str], name: str) -> list[float] | None:
@@ -22,13 +24,24 @@ def in_order(row: Sequence[float], before: Sequence[str], name: str) -> list[flo
     line names a position and a quaternion, or where it is not clear which columns they are.
     """
     for line in reversed(before):
-        for names in lists_in(line, None):
-            found = _columns([stem_and_unit(each) for each in names]) if len(names) == len(row) else None
+        for names in _lists(line, len(row)):
+            found = _columns([stem_and_unit(each) for each in names])
             if found is not None:
                 position, metres, quaternion = found
                 place = in_metres(np.array([[row[k] for k in position]]), metres, name)
                 return [*place[0].tolist(), *(row[k] for k in quaternion)]
     return None
+
+
+def _lists(line: str, width: int) -> Iterator[list[str]]:
+    """The last `width` names of a line, of what stands in brackets at its end, or of what stands before these; without
+    words before the first."""
+    inner = _INNER.search(line)
+    for text in (line, *((inner.group(1), line[: inner.start()]) if inner else ())):
+        for names in lists_in(text, None):
+            last = names[-width:]
+            if len(last) == width and last[0]:
+                yield [last[0].split()[-1] if "[" not in last[0] else last[0], *last[1:]]
 
 
 def _columns(names: Sequence[tuple[str, str]]) -> tuple[list[int], float | None, list[int]] | None:

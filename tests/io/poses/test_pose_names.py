@@ -35,6 +35,13 @@ EUROC = (
         f"# position.x position.y position.z orientation.w orientation.x orientation.y orientation.z\n{T} {WXYZ}",
         f"x;y;z;qw;qx;qy;qz\n{T};{WXYZ}".replace(" ", ";").replace(".", ","),
         f"# columns: vx vy vz x y z qx qy qz qw\n9 9 9 {T} {Q}",
+        f"# Format: x y z qw qx qy qz\n{T} {WXYZ}",
+        f"# the pose is x, y, z, qw, qx, qy, qz\n{T} {WXYZ}",
+        f"# columns = [x, y, z, qw, qx, qy, qz]\n{T} {WXYZ}",
+        f"# seven numbers (x y z qw qx qy qz).\n{T} {WXYZ}",
+        f"%time x y z ori_w ori_x ori_y ori_z\n0 {T} {WXYZ}",
+        f"# x [m], y [m], z [m], qw [], qx [], qy [], qz []\n{T} {WXYZ}",
+        f"# x y z qw qx qy qz (metres, map)\n{T} {WXYZ}",
         # Names that do not say which columns these are leave what seven numbers are without names.
         f"# x y z w x y z\n{T} {Q}",
         f"# from the source to the target, seven numbers\n{T} {Q}",
