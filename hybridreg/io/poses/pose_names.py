@@ -20,7 +20,7 @@ _INNER = re.compile(r"[\[(]([^\[\]()]+)[\])]\W*$")
 def in_order(row: Sequence[float], before: Sequence[str], name: str) -> list[float] | None:
     """x y z qx qy qz qw of a row of numbers, by the last of the lines before it that names every column.
 
-    Many tools write w before x, y and z, and say so only there: EuRoC's files, tables of COLMAP's poses. None where no
+    Many tools write w before x, y and z, and say so only there, as EuRoC's files do. None where no
     line names a position and a quaternion, or where it is not clear which columns they are.
     """
     for line in reversed(before):
