@@ -240,6 +240,14 @@ FIRST_ROWS = {
     'its first row, "\' Trimble", is no comment': f"' Trimble\n{ROWS}",
     "its numbers are separated by ':': '1:2:3'": "1:2:3\n" * 30,
     "its numbers are separated by '|': '1.5|2|3'; separate them by": ROWS.replace(",", "|"),
+    "its numbers have separators of thousands: \"450'002.74;5'399'995.40;299.39\"; export them without": (
+        "450'002.74;5'399'995.40;299.39\n" * 30
+    ),
+    "its numbers have separators of thousands: '450.002.74;5.399.995.40;299.39'": "450.002,74;5.399.995,40;299,39\n"
+    * 30,
+    'have separators of thousands: \'"450,002.74","5,399,995.40","299.39"\'': (
+        '"450,002.74","5,399,995.40","299.39"\n' * 30
+    ),
     "have a D before their exponents: '2.8D+01 1.0D+00 0.5D+00'; write an E": "2.8D+01 1.0D+00 0.5D+00\n"
     * 30,
 }
