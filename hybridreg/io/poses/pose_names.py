@@ -14,16 +14,17 @@ from hybridreg.io.formats.text_names import lists_in
 from hybridreg.io.meaning.length_units import known_metres
 
 _AXES = "xyz"
+_WIDEST = 100  # columns of a table that holds a pose
 _INNER = re.compile(r"[\[(]([^\[\]()]+)[\])]\W*$")
 
 
 def in_order(row: Sequence[float], before: Sequence[str], name: str) -> list[float] | None:
     """x y z qx qy qz qw of a row of numbers, by the last of the lines before it that names every column.
 
-    Many tools write w before x, y and z, and say so only there, as EuRoC's files do. None where no
-    line names a position and a quaternion, or where it is not clear which columns they are.
+    Many tools write w before x, y and z, and say so only there, as EuRoC's files do. None where no line names a
+    position and a quaternion, or where it is not clear which columns they are.
     """
-    for line in reversed(before):
+    for line in reversed(before) if len(row) <= _WIDEST else ():
         for names in _lists(line, len(row)):
             found = _columns([stem_and_unit(each) for each in names])
             if found is not None:

@@ -55,6 +55,13 @@ def test_names_of_the_columns_say_where_w_stands(tmp_path: Path, text: str) -> N
     np.testing.assert_allclose(read_pose(path), POSE, rtol=0, atol=1e-14)
 
 
+def test_a_row_of_any_width_is_answered_at_once(tmp_path: Path) -> None:
+    path = tmp_path / "pose.txt"
+    path.write_text("# " + "w " * 100_000 + "\n" + "1 " * 100_000 + "\n")
+    with pytest.raises(ValueError, match="holds 100000 numbers"):
+        read_pose(path)
+
+
 def test_a_unit_of_the_position_counts(tmp_path: Path) -> None:
     path = tmp_path / "pose.csv"
     path.write_text("x_mm,y_mm,z_mm,qw,qx,qy,qz\n4000,-5500,250," + WXYZ.replace(" ", ",") + "\n")
