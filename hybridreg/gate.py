@@ -24,6 +24,7 @@ OR_DROP = ' or pass nonfinite="drop"'
 _LOT = 2**18  # points
 _FILLED = 0.01  # share of points exactly at the origin from which they count as missing returns
 _COARSE = 0.01  # metres between coordinates from which their rounding is reported
+_TINY = 1e-12  # metres, for the logarithm of zero
 _WHOLE = 1e-6  # of a digit, off by which a decimal number in double precision may be
 _LOOKED_AT = 2_000  # points whose rounding is checked
 
@@ -98,15 +99,26 @@ def rounded(points: Array, name: str) -> None:
     with np.errstate(over="ignore", invalid="ignore"):
         single = some.astype(np.float32)
         kept_so = (single == some).all(axis=0)
-        step = float(np.where(kept_so, np.spacing(away.astype(np.float32)), 0.0).max())
+        steps = np.where(kept_so, np.spacing(away.astype(np.float32)), 0.0)
         units = 10.0 ** (np.floor(np.log10(np.where(some == 0.0, 1.0, np.abs(some)))) - 5.0)
         written_so = bool((np.abs(some / units - np.round(some / units)) < _WHOLE).all())
-    longest = float(away.max())
-    sixth = 10.0 ** (np.floor(np.log10(longest)) - 5.0) if longest > 0.0 else 0.0
-    if written_so and sixth > _COARSE and (np.abs(np.remainder(some, 10.0 * sixth)) > 0.5 * sixth).any():
+    step = float(steps.max())
+    sixths = 10.0 ** (np.floor(np.log10(np.maximum(away, _TINY))) - 5.0)
+    sixth = float(sixths.max())
+    finer = (np.abs(np.remainder(some, 10.0 * sixth)) > 0.5 * sixth).any()
+    if written_so and sixth > _COARSE and finer and not _on_grid(some, sixths):
         _tell_rounded(name, "written with six digits", "with more digits, or binary", sixth)
-    elif step > _COARSE:
+    elif step > _COARSE and not _on_grid(some, steps):
         _tell_rounded(name, "kept in single precision", "in double precision", step)
+
+
+def _on_grid(some: Array, steps: Array) -> bool:
+    """Whether x or y lies on a grid, as heights do, whose numbers have few digits by themselves: on coarser steps than
+    rounding leaves, `steps` (3,)."""
+    flat = some[:, :2]
+    with np.errstate(over="ignore", invalid="ignore"):
+        off = np.remainder(flat - flat[0], np.maximum(2.0 * steps[:2], steps.max()))
+        return bool((~off.any(axis=0) & (np.ptp(flat, axis=0) > 0.0)).any())
 
 
 def _tell_rounded(name: str, problem: str, cure: str, step: float) -> None:

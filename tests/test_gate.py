@@ -177,6 +177,31 @@ def test_map_coordinates_in_single_precision_are_told(dtype: str, told: bool) ->
 
 
 @pytest.mark.parametrize(
+    ("east", "north", "spacing"),
+    [
+        (4.5e5, 5.4e6, 0.5),
+        (4.5e5, 5.4e6, 1.0),
+        (4.5e5 + 0.5, 5.4e6 + 0.5, 1.0),
+        (4.5e6, 5.4e6, 1.0),
+        (2.6e6 + 0.25, 1.2e6 + 0.75, 0.5),
+        (4.5e5, 5.4e6, 10.0),
+        (4.5e6, 5.4e6, 20.0),
+        (4.5e5, 5.4e6, 25.0),
+    ],
+)
+def test_a_grid_of_heights_in_a_map_was_not_rounded(east: float, north: float, spacing: float) -> None:
+    # As elevation models come, and as gdal_translate writes them; they were told to be in single precision,
+    # or written with six digits.
+    x, y = (each.ravel() for each in np.meshgrid(np.arange(40) * spacing, np.arange(50) * spacing))
+    heights = np.round(300.0 + 3.0 * np.sin(x) + np.cos(y), 2)
+    points = np.c_[x + east, y + north, heights]
+    with warnings.catch_warnings(record=True) as seen:
+        warnings.simplefilter("always")
+        PointCloud.of(points, name="map")
+    assert not [str(w.message) for w in seen if "far from the origin" in str(w.message)]
+
+
+@pytest.mark.parametrize(
     "digits, offset, apart",
     [
         ("%.6g", [500_000.0, 5_400_000.0, 300.0], "10 m"),  # UTM

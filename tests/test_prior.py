@@ -342,6 +342,9 @@ def test_files_of_many_poses_are_no_start(tmp_path: Path, form: str) -> None:
         np.array2string(TURNED, precision=17),
         BARE.replace(" ", ","),
         BARE.replace(".", ",").replace(" ", ";"),
+        "[" + BARE.replace(" ", ", ").replace("\n", ";\n ") + "]",
+        "T = [\n" + BARE.replace(" ", ",").replace("\n", ";") + "\n];\n",
+        f"# v1.0, by hand; seen from above\n{BARE.replace('.', ',').replace(' ', ';')}",
         " ".join(BARE.split()),
     ],
 )

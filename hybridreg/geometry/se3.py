@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections import UserList
 from typing import Any
 
 import numpy as np
@@ -122,8 +123,13 @@ def check(T: Any, name: str = "T", tolerance: float = 1e-4) -> Array:
     Raises
     ------
     ValueError
-        Not numbers, wrong shape, not finite, last row not (0, 0, 0, 1), or a rotation off by more than `tolerance`.
+        Not numbers, several poses, wrong shape, not finite, last row not (0, 0, 0, 1), or a rotation off by more than
+        `tolerance`.
     """
+    # spatialmath's SE3 may hold any number of poses, and numpy sees the first of them alone.
+    if isinstance(T, UserList) and hasattr(type(T), "__array_interface__") and len(T) != 1:
+        cure = f", such as {name}[0]" if len(T) else ""
+        raise ValueError(f"{name}: holds {len(T)} poses; give one pose{cure}")
     try:
         matrix = np.asarray(T, dtype=np.float64)
     except (TypeError, ValueError, OverflowError) as error:

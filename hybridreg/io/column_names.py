@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 from hybridreg.io.faults import fault, shorten
-from hybridreg.io.meaning.length_units import ANGLES, METRES
+from hybridreg.io.meaning.length_units import ANGLES, known_metres
 
 _AXES = ("x", "y", "z")
 # What tools put before or behind an axis: ROS, E57, ParaView, spreadsheets. Not `n` or `v`: normals and velocities.
@@ -22,7 +22,7 @@ _SURVEY = (
     ("northing", "northings", "n", "utm_northing", "utm_n", "utm_y", "y_utm"),
     ("height", "elevation", "elev", "altitude", "h", "u", "z", "utm_z", "z_utm"),
 )
-_NAME = re.compile(r"(.*?)\s*(?:[\[(]([^\])]*)[\])]?|[/|]\s*([^/|]+)|[_ ](mm|cm|dm|m|km|ft))?")
+_NAME = re.compile(r"(.*?)\s*(?:[\[(]([^\])]*)[\])]?|[/|]\s*([^/|]+)|[_ ](mm|cm|dm|m|km|ft|us[_-]?ft|ftus))?")
 
 
 class Axes(NamedTuple):
@@ -44,7 +44,7 @@ def find_axes(names: Sequence[str], name: str) -> Axes | None:
     ValueError
         Several columns fit; one axis is in another unit than the others; an axis is an angle.
     """
-    parsed = [_split(each) for each in names]
+    parsed = [stem_and_unit(each) for each in names]
     stems = [stem for stem, _ in parsed]
     if all(stems.count(axis) == 1 for axis in _AXES):
         return _with_unit((stems.index("x"), stems.index("y"), stems.index("z")), parsed, name)
@@ -71,7 +71,7 @@ def axes_in(names: Sequence[str], name: str) -> Axes:
     found = find_axes(names, name)
     if found is not None:
         return found
-    stems = [_split(each)[0] for each in names]
+    stems = [stem_and_unit(each)[0] for each in names]
     held = shorten(", ".join(map(str, names)), 200)
     if {"lon", "lat"} & {stem[:3] for stem in stems} and "x" not in stems:
         problem = f"its columns {held} are longitudes and latitudes"
@@ -81,8 +81,8 @@ def axes_in(names: Sequence[str], name: str) -> Axes:
     raise fault(name, problem, "name the coordinates x, y and z, each once")
 
 
-def _split(label: str) -> tuple[str, str]:
-    """Lower-case name without quotes, and its unit."""
+def stem_and_unit(label: str) -> tuple[str, str]:
+    """A column's lower-case name without quotes, and its unit."""
     match = _NAME.fullmatch(str(label).strip().strip("\"'").strip().lower())
     if match is None:
         return str(label).lower(), ""
@@ -126,7 +126,7 @@ def _with_unit(columns: tuple[int, int, int], parsed: Sequence[tuple[str, str]],
     angle = next((unit for unit in units if unit in ANGLES), None)
     if angle is not None:
         raise fault(name, f"its x, y or z is in {angle!r}", "give Cartesian coordinates in metres")
-    metres = [METRES.get(unit, 1.0) for unit in units]
+    metres = [known_metres(unit) or 1.0 for unit in units]
     if len(set(metres)) > 1:
         told = ", ".join(unit or "none" for unit in units)
         raise fault(name, f"the units of its x, y and z differ: {told}", "give all three in one unit")

@@ -41,6 +41,7 @@ _ELSEWHERE = {
     ".ptx": "export it as .ply or .pts, for example with CloudCompare",
     ".rcp": "export it as .pts or .e57 in ReCap, and that as .ply",
     ".pcap": "convert one frame with the sensor's own tool to .csv, .pcd or .las",
+    ".osf": "save one frame with `ouster-cli source FILE slice 0:1 save OUT.ply`",
     ".lvx": "convert it with Livox Viewer 2 to .lvx2 or .las",
     ".vtk": "save it as .vtp or .ply, for example with ParaView",
     ".vtu": "save its surface as .vtp or .ply, for example by ParaView's Extract Surface",

@@ -24,13 +24,13 @@ from hybridreg.io.recorded import ros_messages, vtk_objects
 Array = NDArray[np.float64]
 
 # Where objects keep their points: pypcd, dev kits and laspy, Open3D and most others, torch_geometric, trimesh's clouds,
-# pymeshlab, py4dgeo.
-_HOLD = ("pc_data", "xyz", "points", "pos", "positions", "vertices", "vertex_matrix", "cloud")
+# pymeshlab, py4dgeo. MeshLab's E57 scans have their pose beside their vertices, which lie in the scanner's frame.
+_HOLD = ("pc_data", "xyz", "points", "pos", "positions", "vertices", "transformed_vertex_matrix", "cloud")
 # Where meshes keep their vertices, and how to ask for them: Open3D's tensors, trimesh and others, pymeshlab.
 _VERTICES = {
     "vertex": 'x.vertex["positions"]',
     "vertices": "x.vertices",
-    "vertex_matrix": "x.vertex_matrix()",
+    "transformed_vertex_matrix": "x.transformed_vertex_matrix()",
 }
 _DEEPEST = 3
 _CURE = "pass an array of shape (N, 3), such as numpy.column_stack([x, y, z])"

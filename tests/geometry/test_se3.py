@@ -2,6 +2,8 @@
 from __future__ import annotations
 
 import re
+from collections import UserList
+from typing import Any
 
 import numpy as np
 import pytest
@@ -116,3 +118,21 @@ def test_a_turn_about_a_place_leaves_it_but_for_the_shift(numbers: list[float]) 
 def test_a_pose_in_another_shape_is_told_how_to_become_a_matrix(shape: tuple[int, ...], cure: str) -> None:
     with pytest.raises(ValueError, match=f"init: expected shape .*{re.escape(cure)}"):
         se3.check(np.zeros(shape), "init")
+
+
+class Poses(UserList[np.ndarray]):
+    # As spatialmath 1.1.18's SE3 keeps its poses: numpy is given the memory of the first.
+    @property
+    def __array_interface__(self) -> dict[str, Any]:
+        return self.data[0].__array_interface__
+
+
+def test_an_object_of_several_poses_is_not_taken_for_its_first() -> None:
+    first, second = random_motion(1), random_motion(2)
+    assert np.array_equal(np.asarray(Poses([first, second])), first)
+    assert np.array_equal(se3.check(Poses([first]), "init"), first)
+    assert np.array_equal(se3.check(UserList(first.tolist()), "init"), first)
+    with pytest.raises(ValueError, match=r"init: holds 2 poses; give one pose, such as init\[0\]"):
+        se3.check(Poses([first, second]), "init")
+    with pytest.raises(ValueError, match="init: holds 0 poses; give one pose$"):
+        se3.check(Poses(), "init")

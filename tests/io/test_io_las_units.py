@@ -40,7 +40,7 @@ def las(
     header = laspy.LasHeader(
         point_format=3 if keys is not None else 6, version="1.2" if keys is not None else "1.4"
     )
-    header.scales = [1e-7] * 3
+    header.scales, header.offsets = [1e-7] * 3, np.floor(points.min(axis=0))
     if keys is not None:
         rows = [1, 1, 0, len(keys)] + [value for key, said in keys.items() for value in (key, 0, 1, said)]
         record = laspy.VLR("LASF_Projection", 34735, "", struct.pack(f"<{len(rows)}H", *rows))
@@ -174,3 +174,54 @@ def test_an_object_whose_records_behind_the_points_were_not_read_says_so() -> No
         record = laspy.LasData(reader.header, reader.read_points(len(P)))
     with pytest.warns(UserWarning, match="1 records behind its points were not read.*laspy.read"):
         np.testing.assert_allclose(PointCloud.of(record).points, P, atol=1e-6)
+
+
+def mercator(method: str, *parameters: str, esri: bool = False) -> str:
+    given = "".join(f",PARAMETER[{each}]" for each in parameters)
+    if esri:
+        return f'PROJCS["m",{GEOGCS},PROJECTION["{method}"]{given},UNIT["Meter",1.0]]'
+    base = 'BASEGEOGCRS["b",DATUM["d",ELLIPSOID["e",6378137,298.25,LENGTHUNIT["metre",1]]]]'
+    return (
+        f'PROJCRS["m",{base},CONVERSION["c",METHOD["{method}"]{given}],CS[Cartesian,2],LENGTHUNIT["metre",1]]'
+    )
+
+
+WEB = "Popular Visualisation Pseudo Mercator"
+STUTTGART = np.array([1.02e6, 6.23e6, 300.0])  # in EPSG:3857, as public airborne clouds are served
+
+
+@pytest.mark.parametrize(
+    "made",
+    [
+        {"keys": {1024: 1, 3072: 3857}},
+        {"keys": {1024: 1, 3072: 3395, 3076: 9001}},
+        {"wkt": mercator("Mercator_Auxiliary_Sphere", '"Standard_Parallel_1",0.0', esri=True)},
+        {"wkt": mercator("Mercator_1SP", '"central_meridian",0', '"scale_factor",1', esri=True)},
+        {"wkt": mercator(WEB, '"Latitude of natural origin",0')},
+        {"wkt": mercator("Mercator (variant A)", '"Scale factor at natural origin",1'), "behind": True},
+    ],
+)
+def test_the_stretch_of_mercators_map_is_told(made: dict) -> None:
+    # By half as much again at this latitude; x and y were taken for metres without a word.
+    with pytest.warns(
+        UserWarning, match=r"a\.las: .* Mercator's.* stretches x and y by 1\.516 there.*project"
+    ):
+        points = parse_las(las(P + STUTTGART, **made), "a.las")
+    np.testing.assert_allclose(points, P + STUTTGART, atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    "made",
+    [
+        {"keys": {1024: 1, 3072: 25832}},
+        {"wkt": mercator("Transverse_Mercator", '"scale_factor",1', esri=True)},
+        {"wkt": mercator("Hotine_Oblique_Mercator_Azimuth_Center", '"scale_factor",1', esri=True)},
+        {"wkt": mercator("Mercator_2SP", '"standard_parallel_1",42', esri=True)},
+        {"wkt": mercator("Mercator (variant A)", '"Scale factor at natural origin",0.997')},
+    ],
+)
+@pytest.mark.filterwarnings("error")
+def test_other_projections_called_after_mercator_are_metres(made: dict) -> None:
+    parse_las(las(P + STUTTGART, **made), "a.las")
+    near = {"keys": {1024: 1, 3072: 3857}}  # at the equator, or moved to an origin of its own
+    np.testing.assert_allclose(parse_las(las(P, **near), "a.las"), P, atol=1e-6)

@@ -253,6 +253,22 @@ def test_a_doubtful_first_column_is_told(words: str) -> None:
         PointCloud.of(pd.DataFrame(table))
 
 
+@pytest.mark.parametrize("colours", [0, 3])
+@pytest.mark.parametrize("holes", [1, 3])
+def test_row_and_column_before_the_points_are_told(tmp_path: Any, holes: int, colours: int) -> None:
+    # As organised scans are exported; they were taken for x and y without a word.
+    pixels = np.stack(np.meshgrid(np.arange(12.0), np.arange(40.0), indexing="ij"), axis=-1).reshape(-1, 2)
+    points = np.random.default_rng(3).uniform(-9.0, 9.0, (480, 3))
+    points[::holes] *= float(holes == 1)
+    table = np.c_[pixels, points, np.zeros((480, colours))]
+    np.savetxt(tmp_path / "a.txt", table)
+    for given in (table, tmp_path / "a.txt", table[:, [1, 0, *range(2, 5 + colours)]]):
+        with pytest.warns(UserWarning, match="first two columns .*row column x y z"):
+            PointCloud.of(given)
+    np.savetxt(tmp_path / "b.txt", table, header="row column x y z" + " c" * colours, comments="")
+    same(tmp_path / "b.txt", points)
+
+
 def test_normals_before_the_points_are_told() -> None:
     with pytest.warns(UserWarning, match=r"first three columns .* length 1 in each row"):
         PointCloud.of(np.c_[P / R[:, None], P])
@@ -262,7 +278,9 @@ def test_normals_before_the_points_are_told() -> None:
 def test_first_columns_that_may_well_be_x() -> None:
     x, y = (each.ravel() for each in np.meshgrid(np.arange(40.0), np.arange(30.0), indexing="ij"))
     heights = np.c_[x, y, np.sin(x) + np.cos(y), x % 5]
-    for table in (heights, heights[:, [1, 0, 2, 3]], heights * [0.5, 0.5, 1, 1]):
+    repeated = np.c_[heights[:, :3], np.sin(x), np.cos(y)][np.r_[:1200, :1200]]
+    PointCloud.of(np.c_[heights[:, :3] + [450_000.0, 5_400_000.0, 0.0], np.sin(x), np.cos(y)])
+    for table in (heights, heights[:, [1, 0, 2, 3]], heights * [0.5, 0.5, 1, 1], repeated):
         same(table, table[:, :3])
     sorted_ = np.unique(np.c_[P, R], axis=0)
     same(sorted_, sorted_[:, :3])
@@ -452,7 +470,10 @@ def test_meshes_of_meshio_pyntcloud_and_pymeshlab_are_no_clouds() -> None:
 
     def meshlab(count: int) -> SimpleNamespace:
         return SimpleNamespace(
-            vertex_matrix=lambda: P, face_matrix=lambda: triangle, face_number=lambda: count
+            vertex_matrix=lambda: P - 1.0,  # not moved yet by the matrix beside it, as of an E57 scan
+            transformed_vertex_matrix=lambda: P,
+            face_matrix=lambda: triangle,
+            face_number=lambda: count,
         )
 
     same(SimpleNamespace(points=P, cells=[]))
@@ -461,7 +482,7 @@ def test_meshes_of_meshio_pyntcloud_and_pymeshlab_are_no_clouds() -> None:
     same(meshlab(0))
     for mesh in (meshio("triangle", triangle), SimpleNamespace(points=points, mesh=faces)):
         assert "a mesh is not a cloud; sample its surface, or pass its vertices, x.points" in refused(mesh)
-    assert "x.vertex_matrix()" in refused(meshlab(1))
+    assert "x.transformed_vertex_matrix()" in refused(meshlab(1))
     assert "x.current_mesh()" in refused(SimpleNamespace(current_mesh=lambda: meshlab(0)))
 
 

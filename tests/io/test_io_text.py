@@ -123,7 +123,19 @@ def test_a_unit_in_the_header_is_believed_and_told(style):
     np.testing.assert_allclose(points, THREE)
 
 
-@pytest.mark.parametrize("feet, metres", [("ft", 0.3048), ("feet", 0.3048), ("US survey feet", 1200 / 3937)])
+US = 1200 / 3937
+
+
+@pytest.mark.parametrize(
+    "feet, metres",
+    [
+        *(("ft", 0.3048), ("feet", 0.3048), ("Intl. ft", 0.3048), ("international feet", 0.3048)),
+        *(
+            (each, US)
+            for each in ("US survey feet", "U.S. Survey Feet", "US ft", "us-ft", "usft", "ftUS", "US_ft")
+        ),
+    ],
+)
 def test_feet(feet, metres):
     with pytest.warns(UserWarning, match=r"0\.3048"):
         points = parse_text(f"x ({feet}),y ({feet}),z ({feet})\n1,2,3\n4,5,6\n".encode(), "a.csv")
@@ -132,13 +144,22 @@ def test_feet(feet, metres):
 
 def test_feet_and_inches_in_a_comment():
     for comment, metres in (
-        ("Units: US survey feet", 1200 / 3937),
+        ("Units: US survey feet", US),
+        ("coordinates in U.S. survey feet", US),
+        ("unit: us-ft", US),
+        ("unit = US ft", US),
         ("unit: inch", 0.0254),
         ("unit: in", 0.0254),
     ):
         with pytest.warns(UserWarning, match="its unit is 0"):
             points = parse_text(f"# {comment}\n1 2 3\n4 5 6\n".encode(), "a.txt")
         np.testing.assert_allclose(points, np.array([[1, 2, 3], [4, 5, 6]]) * metres)
+
+
+def test_feet_behind_the_name_of_a_column():
+    with pytest.warns(UserWarning, match=r"its unit is 0\.304801 m"):
+        points = parse_text(b"x_usft,y_usft,z_usft\n1,2,3\n4,5,6\n", "a.csv")
+    np.testing.assert_allclose(points, np.array([[1, 2, 3], [4, 5, 6]]) * US)
 
 
 def test_heights_have_the_unit_that_their_own_system_gives():
@@ -219,6 +240,14 @@ FIRST_ROWS = {
     'its first row, "\' Trimble", is no comment': f"' Trimble\n{ROWS}",
     "its numbers are separated by ':': '1:2:3'": "1:2:3\n" * 30,
     "its numbers are separated by '|': '1.5|2|3'; separate them by": ROWS.replace(",", "|"),
+    "its numbers have separators of thousands: \"450'002.74;5'399'995.40;299.39\"; export them without": (
+        "450'002.74;5'399'995.40;299.39\n" * 30
+    ),
+    "its numbers have separators of thousands: '450.002.74;5.399.995.40;299.39'": "450.002,74;5.399.995,40;299,39\n"
+    * 30,
+    'have separators of thousands: \'"450,002.74","5,399,995.40","299.39"\'': (
+        '"450,002.74","5,399,995.40","299.39"\n' * 30
+    ),
     "have a D before their exponents: '2.8D+01 1.0D+00 0.5D+00'; write an E": "2.8D+01 1.0D+00 0.5D+00\n"
     * 30,
 }

@@ -14,6 +14,7 @@ _OWN = 32767  # a system or a unit that is no code of EPSG's
 _MODEL, _GEOGRAPHIC = 1024, 2  # GTModelTypeGeoKey, and its ModelTypeGeographic
 _DEGREES = 2048  # GeographicTypeGeoKey: the system itself, or the one beneath a projected system
 _ACROSS, _ACROSS_UNIT = 3072, 3076  # ProjectedCSTypeGeoKey, ProjLinearUnitsGeoKey
+_MERCATOR = (3857, 3785, 3395, 54004)  # EPSG's for web maps, now and before, and for the world; Esri's
 _UP, _UP_UNIT = 4096, 4099  # VerticalCSTypeGeoKey, VerticalUnitsGeoKey
 
 
@@ -28,7 +29,9 @@ def unit_of_keys(keys: Mapping[int, int]) -> LengthUnit:
     across, unknown = _length(keys, _ACROSS, _ACROSS_UNIT)
     up, unknown_up = _length(keys, _UP, _UP_UNIT)
     metres = across or 1.0
-    return LengthUnit(metres, up or metres, unknown=unknown or unknown_up)
+    return LengthUnit(
+        metres, up or metres, unknown=unknown or unknown_up, stretched=keys.get(_ACROSS) in _MERCATOR
+    )
 
 
 def _length(keys: Mapping[int, int], system: int, unit: int) -> tuple[float | None, str]:

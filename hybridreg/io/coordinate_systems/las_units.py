@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybridreg.io.coordinate_systems.geo_keys import unit_of_keys
-from hybridreg.io.coordinate_systems.length_unit import LengthUnit, in_metres
+from hybridreg.io.coordinate_systems.length_unit import LengthUnit, in_metres, tell_stretch
 from hybridreg.io.coordinate_systems.well_known_text import unit_of_text
 from hybridreg.io.faults import fault
 
@@ -37,6 +37,7 @@ def metres_of_las(points: Array, records: Iterable[Any], name: str) -> Array:
             f"{name}: its coordinate system, {unit.unknown}, gives no unit that is known here; what it does not give "
             "was taken for metres: convert it to metres first where it is in feet"
         )
+    tell_stretch(points, unit, name)
     return in_metres(points, unit.across, name, up=unit.up)
 
 

@@ -12,14 +12,36 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 
+_EARTH = 6_378_137.0  # metres, of WGS 84's equator
+# From where a stretch is told: a tenth of a metre in a hundred; and that of the poles, where Mercator's map ends.
+_LEAST, _MOST = 1.001, 12.0
+
+
 class LengthUnit(NamedTuple):
-    """Metres of one unit across (x, y) and up (z); whether x and y are degrees; and which system gives no unit that is
-    known here, in words, "" where each does."""
+    """Metres of one unit across (x, y) and up (z); whether x and y are degrees; which system gives no unit that is
+    known here, in words, "" where each does; and whether its metres are right along the equator alone (Mercator)."""
 
     across: float = 1.0
     up: float = 1.0
     degrees: bool = False
     unknown: str = ""
+    stretched: bool = False
+
+
+def tell_stretch(points: Array, unit: LengthUnit, name: str) -> None:
+    """Warn where x and y (N, 3) are Mercator's, stretched by the secant of the latitude, and z is not."""
+    if not unit.stretched or not len(points):
+        return
+    with np.errstate(over="ignore"):
+        factor = float(np.cosh(np.median(points[:, 1]) / _EARTH))
+    if _LEAST < factor < _MOST:
+        warnings.warn(
+            f"{name}: its coordinate system is Mercator's, as web maps have it, which stretches x and y by "
+            f"{factor:.4g} there, and heights not at all; project it to metres first, for example with PDAL's "
+            "filters.reprojection to UTM",
+            UserWarning,
+            stacklevel=4,
+        )
 
 
 def in_metres(points: Array, metres: float | None, name: str, *, up: float | None = None) -> Array:

@@ -26,6 +26,8 @@ _FLAT = (
 _GEODETIC = ("GEODCRS", "GEODETICCRS")  # in degrees, or geocentric in metres
 _DEGREES = ("GEOGCS", "GEOGCRS", "GEOGRAPHICCRS")
 _UPRIGHT = ("VERT_CS", "VERTCS", "VERTCRS", "VERTICALCRS")
+_METHODS = ("PROJECTION", "METHOD")
+_MERCATOR = re.compile(r"(popular visualisation pseudo )?mercator")
 _UNITS = ("UNIT", "LENGTHUNIT")
 
 
@@ -64,7 +66,8 @@ def unit_of_text(text: str) -> LengthUnit:
     heights = _lengths(upright) if upright else lengths[2:]
     unknown = _told(across or upright, text) if not lengths or (upright and not heights) else ""
     metres = lengths[0] if lengths else 1.0
-    return LengthUnit(metres, heights[0] if heights else metres, unknown=unknown)
+    up, stretched = heights[0] if heights else metres, across is not None and _is_mercator(across)
+    return LengthUnit(metres, up, unknown=unknown, stretched=stretched)
 
 
 def _parsed(text: str) -> _Node:
@@ -80,6 +83,22 @@ def _parsed(text: str) -> _Node:
         else:
             opened[-1].words.append(quoted or word)
     return top
+
+
+def _is_mercator(node: _Node) -> bool:
+    """Whether a system's projection is Mercator's with the scale of the equator, no transverse or oblique one."""
+    nodes = list(node.walk())
+    methods = [each.words[0].lower() for each in nodes if each.keyword in _METHODS and each.words]
+    if not any(_MERCATOR.match(method) for method in methods):
+        return False
+    given = {
+        re.sub(r"\W|_", "", each.words[0].lower()): value
+        for each in nodes
+        if each.keyword == "PARAMETER" and (value := _number(each)) is not None
+    }
+    parallels = [value for key, value in given.items() if "parallel" in key]
+    scales = [value for key, value in given.items() if key.startswith("scalefactor")]
+    return not any(parallels) and all(value == 1.0 for value in scales)
 
 
 def _in_degrees(node: _Node) -> bool:
@@ -106,11 +125,15 @@ def _lengths(node: _Node) -> list[float]:
 
 
 def _factor(node: _Node) -> float | None:
+    metres = _number(node)
+    return metres if metres is not None and math.isfinite(metres) and metres > 0.0 else None
+
+
+def _number(node: _Node) -> float | None:
     try:
-        metres = float(node.words[1])
+        return float(node.words[1])
     except (IndexError, ValueError):
         return None
-    return metres if math.isfinite(metres) and metres > 0.0 else None
 
 
 def _told(node: _Node | None, text: str) -> str:

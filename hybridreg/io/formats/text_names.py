@@ -33,7 +33,7 @@ def axes_in_comments(comments: Sequence[str], delimiter: str | None, width: int,
     ValueError
         As `find_axes`, of a comment that names each column.
     """
-    lists = [names for line in reversed(comments) for names in _lists(line, delimiter)]
+    lists = [names for line in reversed(comments) for names in lists_in(line, delimiter)]
     for names in lists:
         for ending in (names, names[-width:]):
             if len(ending) == width and (found := find_axes(ending, name)) is not None:
@@ -54,7 +54,8 @@ def is_number(word: str) -> bool:
     return True
 
 
-def _lists(comment: str, delimiter: str | None) -> Iterator[list[str]]:
+def lists_in(comment: str, delimiter: str | None) -> Iterator[list[str]]:
+    """The lists of names that a comment, or a line of words, may be read as."""
     text = comment.strip(_MARKS)
     for row in dict.fromkeys((_TITLE.sub("", text, count=1) if _TITLE.match(text) else text, text)):
         for mark in dict.fromkeys((delimiter, *(each for each in (",", ";", "\t") if each in row), None)):

@@ -3,13 +3,18 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 from numpy.typing import NDArray
 
 from hybridreg.io.faults import fault, shorten
+from hybridreg.io.formats.text_names import is_number
 
 # Values in the rows behind a PTX scan's two counts: the scanner's place and axes, and a matrix.
 _PTX = [3, 3, 3, 3, 4, 4, 4, 4]
+# Digits in threes, with what spreadsheets and surveyors put between them: `450'002.74`, `5.399.995,40`.
+_IN_THREES = re.compile(r"[-+]?\d{1,3}(?:[.,'’\u00a0\u202f]\d{3})+(?:[.,]\d*)?")
 
 
 def text_lines(data: bytes) -> list[str]:
@@ -61,6 +66,11 @@ def parse_rows(
     try:
         return np.loadtxt(lines, usecols=columns, delimiter=delimiter, comments=None, quotechar='"', ndmin=2)
     except ValueError as error:
+        cells = [cell.strip(' "') for cell in [*lines[0].split(delimiter), *lines[0].split('"')]]
+        apart = next((cell for cell in cells if _IN_THREES.fullmatch(cell) and not is_number(cell)), None)
+        if apart is not None:
+            problem = f"its numbers have separators of thousands: {shorten(lines[0])}"
+            raise fault(name, problem, "export them without") from error
         problem = _first_bad_row(lines, columns, delimiter) or shorten(error, 200)
         raise fault(name, problem, "remove or repair the row") from error
 
@@ -71,8 +81,6 @@ def _first_bad_row(lines: list[str], columns: tuple[int, int, int], delimiter: s
         if len(values) <= max(columns):
             return f"row {number} has {len(values)} values, {max(columns) + 1} are needed: {shorten(line)}"
         for column in columns:
-            try:
-                float(values[column].strip(' "'))
-            except ValueError:
+            if not is_number(values[column].strip(' "')):
                 return f"row {number} has {shorten(values[column])} where a number is needed: {shorten(line)}"
     return ""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""First columns that are no x: numbers of rows, ranges, times, labels, indices of a batch, normals."""
+"""First columns that are no x: numbers of rows, ranges, times, labels, indices of a batch, pixels, normals."""
 
 from __future__ import annotations
 
@@ -19,6 +19,7 @@ _WIDEST = 6  # columns looked at: a normal and a point
 _NEARLY_ALL = 0.99  # share of rows
 _SAME = 2e-3  # of a length, as far as stored numbers are rounded
 _MOST_LABELS = 256  # rings, classes, clouds of a batch
+_MOST_PIXELS = 100_000  # columns of a scanner's panorama and more; a map's coordinates are larger
 _EPOCH = 1e8  # seconds since 1970 in 1973; no map grid goes so far in metres
 _STRAIGHT = 0.05  # of its span: a clock's distance from a straight line, by hand
 _SWEEP = 1.0  # seconds: only a time within a sweep goes from below to above zero
@@ -42,7 +43,14 @@ def check_first_column(rows: NDArray[Any], name: str, cure: str) -> None:
         return
     if _is_range(some):
         raise fault(name, "its first column is the length of the next three, not a coordinate", cure)
-    if found := _doubt(some):
+    if _are_pixels(some):
+        warnings.warn(
+            f"{name}: its first two columns were read as x and y, and hold whole numbers, each pair of them once; "
+            "if they are row and column of an image, name the columns (row column x y z), or give x, y and z first",
+            UserWarning,
+            stacklevel=3,
+        )
+    elif found := _doubt(some):
         warnings.warn(
             f"{name}: its first column was read as x, and {found}; if it is no coordinate, {cure}",
             UserWarning,
@@ -146,6 +154,19 @@ def _is_sorted(some: Array) -> bool:
     alike = np.diff(some[:, 0]) == 0.0
     steps = np.diff(some[:, 1])[alike]
     return bool(alike.mean() > 0.05 and ((steps >= 0.0).all() or (steps <= 0.0).all()))
+
+
+def _are_pixels(some: Array) -> bool:
+    # Of an organised scan: row, column, x, y, z. A grid of heights seldom has two columns more of that kind.
+    if some.shape[1] < 5:
+        return False
+    first, points = some[:, :2], some[:, 2:5]
+    if not _whole(first) or first.min() < 0.0 or first.max() > _MOST_PIXELS:
+        return False
+    points = points[points.any(axis=1)]  # others are missing returns
+    if len(points) < FEWEST or (np.mean(points == np.round(points), axis=0) >= 0.5).any():
+        return False
+    return len(np.unique(first, axis=0)) == len(first)
 
 
 def _are_normals(some: Array) -> bool:

@@ -11,25 +11,31 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hybridreg.io.coordinate_systems.length_unit import LengthUnit, in_metres
+from hybridreg.io.coordinate_systems.length_unit import LengthUnit, in_metres, tell_stretch
 from hybridreg.io.coordinate_systems.well_known_text import unit_of_text
 from hybridreg.io.faults import fault, shorten
 
 Array = NDArray[np.float64]
 
-METRES = {
+# Without spaces, full stops and hyphens, which are put between the letters in every way.
+_METRES = {
     **dict.fromkeys(("m", "metre", "metres", "meter", "meters"), 1.0),
     **dict.fromkeys(("mm", "millimetre", "millimetres", "millimeter", "millimeters"), 1e-3),
     **dict.fromkeys(("cm", "centimetre", "centimetres", "centimeter", "centimeters"), 1e-2),
     **dict.fromkeys(("dm", "decimetre", "decimetres", "decimeter", "decimeters"), 1e-1),
     **dict.fromkeys(("km", "kilometre", "kilometres", "kilometer", "kilometers"), 1e3),
-    **dict.fromkeys(("ft", "foot", "feet"), 0.3048),
-    **dict.fromkeys(("ftus", "us-ft", "usft", "us survey foot", "us survey feet"), 1200 / 3937),
+    **dict.fromkeys(
+        ("um", "µm", "μm", "micrometre", "micrometres", "micrometer", "micrometers", "micron"), 1e-6
+    ),
+    **dict.fromkeys(("ft", "foot", "feet", "intlft", "internationalfoot", "internationalfeet"), 0.3048),
+    **dict.fromkeys(("ftus", "usft", "usfoot", "usfeet", "sft", "surveyfoot", "surveyfeet"), 1200 / 3937),
+    **dict.fromkeys(("ussurveyft", "ussurveyfoot", "ussurveyfeet"), 1200 / 3937),
     **dict.fromkeys(("in", "inch", "inches"), 0.0254),
 }
 ANGLES = ("deg", "degree", "degrees", "°", "rad", "radian", "radians")
 
-_WORD = r"(us survey f[oe][oe]t|[a-z°]+(?:-ft)?)"
+_BETWEEN = re.compile(r"[\s._-]+")
+_WORD = r"((?:u\.?s\.?|intl\.?|international)[ -]?(?:survey )?(?:ft|f[oe][oe]t)|[a-zµμ°]+)"
 _SAYS = (
     re.compile(
         rf"(?:([a-z]+)[ _-]+)?(?<![a-z])units?\b\W*(?:(?:is|are|in)\b\W*){{0,2}}{_WORD}", re.IGNORECASE
@@ -98,7 +104,12 @@ def metres_of(word: str, name: str) -> float | None:
         raise fault(
             name, f"the unit of its x, y and z is {shorten(word)}", "give Cartesian coordinates in metres"
         )
-    return METRES.get(lowered)
+    return known_metres(word)
+
+
+def known_metres(word: str) -> float | None:
+    """Metres of a unit of length, None where it is not known."""
+    return _METRES.get(_BETWEEN.sub("", word.lower()))
 
 
 def unit_given(x: Any, name: str) -> float | None:
@@ -150,6 +161,7 @@ def as_commented(points: Array, comments: Iterable[str], name: str) -> Array:
                 stacklevel=3,
             )
     unit = unit_in(lines, name) or LengthUnit()
+    tell_stretch(points, unit, name)
     return in_metres(points, unit.across, name, up=unit.up)
 
 

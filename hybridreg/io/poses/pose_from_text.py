@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybridreg.io.faults import fault
+from hybridreg.io.poses.pose_names import in_order
 from hybridreg.io.poses.pose_numbers import ONE_POSE, number_of, pose_of_angles, pose_of_numbers
 from hybridreg.io.poses.ros_publisher import PUBLISHER, pose_of_publisher
 
@@ -22,8 +23,9 @@ _BRACKETS = str.maketrans("[](){}", "      ")
 
 
 def pose_of_text(text: str, name: str) -> Array:
-    """A pose (4, 4) from any form that the library writes, or from numbers in brackets, with commas, or with
-    semicolons and decimal commas. Comments and lines of words alone are left out.
+    """A pose (4, 4) from any form that the library writes, or from numbers in brackets, with commas, with semicolons
+    that end rows, or with semicolons and decimal commas. Comments and lines of words alone are left out, but for names
+    of the columns of a position and a quaternion: they say whether w stands first.
 
     Raises
     ------
@@ -34,10 +36,21 @@ def pose_of_text(text: str, name: str) -> Array:
         return pose_of_publisher(text, name)
     if "<origin" in text or "<robot" in text:
         return _of_origin(text, name)
-    text = text.replace(",", ".").replace(";", " ") if ";" in text else text.replace(",", " ")
-    lines = [line.strip() for line in text.translate(_BRACKETS).splitlines()]
-    rows = [line.split() for line in lines if not line.startswith(_COMMENTS) and _NUMBERS.search(line)]
-    return pose_of_numbers(_as_rows([[number_of(word, name) for word in row] for row in rows]), name)
+    lines = [line.strip() for line in _spaced(text.translate(_BRACKETS)).splitlines()]
+    full = [k for k, line in enumerate(lines) if not line.startswith(_COMMENTS) and _NUMBERS.search(line)]
+    rows = [[number_of(word, name) for word in lines[k].split()] for k in full]
+    named = in_order(rows[0], text.splitlines()[: full[0]], name) if len(rows) == 1 else None
+    return pose_of_numbers(_as_rows(rows) if named is None else named, name)
+
+
+def _spaced(text: str) -> str:
+    """Numbers with spaces between them, for commas and semicolons. Where both stand, a comma is the decimal point of a
+    spreadsheet, or semicolons end the rows, as in MATLAB."""
+    rows = [line for line in text.splitlines() if not line.strip().startswith(_COMMENTS)]
+    cells = [cell.strip() for row in rows for cell in row.split(";")]
+    ends = any(cell.count(",") > 1 or ("," in cell and "." in cell) or ", " in cell for cell in cells)
+    decimal = ";" in text and not ends
+    return text.replace(",", "." if decimal else " ").replace(";", " ")
 
 
 def _as_rows(rows: list[list[float]]) -> list[Any]:

@@ -141,6 +141,7 @@ def test_what_is_wrong_with_a_bag_is_told_with_a_cure(typesys: Any, tmp_path: Pa
         ("A.BAG", whole, r"rename it to end in \.bag"),
         ("b.bag", whole[: len(whole) // 2], "rosbag reindex"),
         ("c.bag.active", whole, "rosbag reindex"),
+        ("d.osf", whole, "no reader for '.osf'; save one frame with `ouster-cli"),
     ):
         (tmp_path / name).write_bytes(data)
         with pytest.raises(ValueError, match=word):

@@ -1,0 +1,69 @@
+# SPDX-License-Identifier: MIT
+"""A pose of one row whose columns a line before it names: which are its position and its quaternion."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from hybridreg.io.column_names import stem_and_unit
+from hybridreg.io.coordinate_systems.length_unit import in_metres
+from hybridreg.io.formats.text_names import lists_in
+from hybridreg.io.meaning.length_units import known_metres
+
+_AXES = "xyz"
+_WIDEST = 100  # columns of a table that holds a pose
+_INNER = re.compile(r"[\[(]([^\[\]()]+)[\])]\W*$")
+
+
+def in_order(row: Sequence[float], before: Sequence[str], name: str) -> list[float] | None:
+    """x y z qx qy qz qw of a row of numbers, by the last of the lines before it that names every column.
+
+    Many tools write w before x, y and z, and say so only there, as EuRoC's files do. None where no line names a
+    position and a quaternion, or where it is not clear which columns they are.
+    """
+    for line in reversed(before) if len(row) <= _WIDEST else ():
+        for names in _lists(line, len(row)):
+            found = _columns([stem_and_unit(each) for each in names])
+            if found is not None:
+                position, metres, quaternion = found
+                place = in_metres(np.array([[row[k] for k in position]]), metres, name)
+                return [*place[0].tolist(), *(row[k] for k in quaternion)]
+    return None
+
+
+def _lists(line: str, width: int) -> Iterator[list[str]]:
+    """The last `width` names of a line, of what stands in brackets at its end, or of what stands before these; without
+    words before the first."""
+    inner = _INNER.search(line)
+    for text in (line, *((inner.group(1), line[: inner.start()]) if inner else ())):
+        for names in lists_in(text, None):
+            last = names[-width:]
+            if len(last) == width and last[0]:
+                yield [last[0].split()[-1] if "[" not in last[0] else last[0], *last[1:]]
+
+
+def _columns(names: Sequence[tuple[str, str]]) -> tuple[list[int], float | None, list[int]] | None:
+    stems = [stem for stem, _ in names]
+    turns = [stem[:-1] for stem in stems if stem.endswith("w") and _together(stems, stem[:-1], _AXES + "w")]
+    if len(turns) != 1:
+        return None
+    quaternion = _together(stems, turns[0], _AXES + "w")
+    places = [
+        columns
+        for stem in stems
+        if stem.endswith("x") and stem[:-1] != turns[0] and (columns := _together(stems, stem[:-1], _AXES))
+    ]
+    if not places:
+        return None
+    # Where velocities and the like stand there too, x, y and z alone are the position, or else what comes first.
+    position = next((each for each in places if stems[each[0]] == "x"), places[0])
+    units = {names[k][1] for k in position}
+    return position, known_metres(units.pop()) if len(units) == 1 else None, quaternion
+
+
+def _together(stems: Sequence[str], prefix: str, axes: str) -> list[int]:
+    wanted = [prefix + axis for axis in axes]
+    return [stems.index(each) for each in wanted] if all(stems.count(each) == 1 for each in wanted) else []

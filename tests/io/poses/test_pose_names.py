@@ -1,0 +1,80 @@
+# SPDX-License-Identifier: MIT
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from hybridreg.io.poses.pose_file import read_pose
+
+PLACE, XYZW = [4.0, -5.5, 0.25], [0.1, -0.5, 0.3, 0.806225774829855]
+POSE = np.eye(4)
+POSE[:3, :3], POSE[:3, 3] = Rotation.from_quat(XYZW).as_matrix(), PLACE
+T = " ".join(map(str, PLACE))
+Q = " ".join(map(str, XYZW))
+WXYZ = " ".join(map(str, [XYZW[3], *XYZW[:3]]))
+# As ASL's files of EuRoC have them, with velocities and biases behind the pose.
+EUROC = (
+    "#timestamp, p_RS_R_x [m], p_RS_R_y [m], p_RS_R_z [m], q_RS_w [], q_RS_x [], q_RS_y [], q_RS_z [], "
+    "v_RS_R_x [m s^-1], v_RS_R_y [m s^-1], v_RS_R_z [m s^-1]"
+)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        f"# x y z qw qx qy qz\n{T} {WXYZ}",
+        f"# tx ty tz qx qy qz qw\n{T} {Q}",
+        f"timestamp,x,y,z,qw,qx,qy,qz\n0,{T} {WXYZ}".replace(" ", ","),
+        f"% tx ty tz w x y z\n{T} {WXYZ}",
+        f"QW QX QY QZ TX TY TZ\n{WXYZ} {T}",
+        f"{EUROC}\n1403636579758555392 {T} {WXYZ} 0 0 0".replace("392 ", "392,"),
+        f"# a pose of yesterday\n# time qx qy qz qw x y z\n0 {Q} {T}",
+        f"# position.x position.y position.z orientation.w orientation.x orientation.y orientation.z\n{T} {WXYZ}",
+        f"x;y;z;qw;qx;qy;qz\n{T};{WXYZ}".replace(" ", ";").replace(".", ","),
+        f"# columns: vx vy vz x y z qx qy qz qw\n9 9 9 {T} {Q}",
+        f"# Format: x y z qw qx qy qz\n{T} {WXYZ}",
+        f"# the pose is x, y, z, qw, qx, qy, qz\n{T} {WXYZ}",
+        f"# columns = [x, y, z, qw, qx, qy, qz]\n{T} {WXYZ}",
+        f"# seven numbers (x y z qw qx qy qz).\n{T} {WXYZ}",
+        f"%time x y z ori_w ori_x ori_y ori_z\n0 {T} {WXYZ}",
+        f"# x [m], y [m], z [m], qw [], qx [], qy [], qz []\n{T} {WXYZ}",
+        f"# x y z qw qx qy qz (metres, map)\n{T} {WXYZ}",
+        # Names that do not say which columns these are leave what seven numbers are without names.
+        f"# x y z w x y z\n{T} {Q}",
+        f"# from the source to the target, seven numbers\n{T} {Q}",
+        f"# x y z q1 q2 q3 q4\n{T} {Q}",
+    ],
+)
+def test_names_of_the_columns_say_where_w_stands(tmp_path: Path, text: str) -> None:
+    # Read as x y z w they gave another rotation, without a word.
+    path = tmp_path / "pose.txt"
+    path.write_text(text)
+    np.testing.assert_allclose(read_pose(path), POSE, rtol=0, atol=1e-14)
+
+
+def test_a_row_of_any_width_is_answered_at_once(tmp_path: Path) -> None:
+    path = tmp_path / "pose.txt"
+    path.write_text("# " + "w " * 100_000 + "\n" + "1 " * 100_000 + "\n")
+    with pytest.raises(ValueError, match="holds 100000 numbers"):
+        read_pose(path)
+
+
+def test_a_unit_of_the_position_counts(tmp_path: Path) -> None:
+    path = tmp_path / "pose.csv"
+    path.write_text("x_mm,y_mm,z_mm,qw,qx,qy,qz\n4000,-5500,250," + WXYZ.replace(" ", ",") + "\n")
+    with pytest.warns(UserWarning, match=r"its unit is 0\.001 m; it was read in metres"):
+        found = read_pose(path)
+    np.testing.assert_allclose(found, POSE, rtol=0, atol=1e-14)
+
+
+def test_named_columns_that_hold_no_rotation_are_refused(tmp_path: Path) -> None:
+    path = tmp_path / "pose.txt"
+    path.write_text(f"# qx qy qz qw x y z\n{T} {Q}\n")
+    with pytest.raises(ValueError, match="a quaternion has 1"):
+        read_pose(path)
+    path.write_text(f"# x y z qw qx qy qz\n{T} {WXYZ}\n{T} {WXYZ}\n")
+    with pytest.raises(ValueError, match="holds 2 poses"):
+        read_pose(path)
