@@ -237,6 +237,15 @@ def test_a_sensor_frame_in_single_precision_is_fine() -> None:
         PointCloud.of(points, name="scan")
 
 
+@pytest.mark.parametrize("tiny", [1e-320, 5e-324, -1e-310, 1e-30])
+def test_numbers_next_to_zero_are_no_rounding(tiny: float) -> None:
+    points = np.random.default_rng(0).uniform(-20.0, 20.0, (300, 3))
+    points[7] = tiny
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        hr.PointCloud.of(points)
+
+
 def test_an_open_file_is_refused_with_a_cure() -> None:
     with pytest.raises(ValueError, match="pass the path of the file"):
         PointCloud.of(io.BytesIO(b"ply"))

@@ -41,11 +41,11 @@ def guided_pose(T_target_source: Array, source: Described, target: Described, ra
     T = T_target_source
     if not len(source.points) or not len(target.points):
         return T
-    tree = cKDTree(target.points)
+    trees = cKDTree(source.points), cKDTree(target.points)
     for radius in radii:
-        moved = se3.apply(T, source.points)
-        there, weight_there = _matched(moved, source.features, tree, target.features, radius)
-        back, weight_back = _matched(target.points, target.features, cKDTree(moved), source.features, radius)
+        moved, moved_back = se3.apply(T, source.points), se3.apply(se3.inverse(T), target.points)
+        there, weight_there = _matched(moved, source.features, trees[1], target.features, radius)
+        back, weight_back = _matched(moved_back, target.features, trees[0], source.features, radius)
         if np.count_nonzero(weight_there) + np.count_nonzero(weight_back) < _FEWEST:
             break
         fitted, status = kabsch(
@@ -62,16 +62,22 @@ def guided_pose(T_target_source: Array, source: Described, target: Described, ra
 def _matched(
     points: Array, features: NDArray[np.float32], tree: cKDTree, others: NDArray[np.float32], radius: float
 ) -> tuple[NDArray[np.int64], Array]:
-    # The row of each point's match, and its weight: zero where no other point is within the radius.
-    distance, near = tree.query(points, k=min(_CANDIDATES, tree.n), distance_upper_bound=radius)
-    distance, near = distance.reshape(len(points), -1), near.reshape(len(points), -1)
+    # The row of each point's match, and its weight: zero where no other point is within the radius, as beyond the
+    # overlap.
+    distance, near = tree.query(
+        points, k=[*range(1, min(_CANDIDATES, tree.n) + 1)], distance_upper_bound=radius
+    )
+    some = np.flatnonzero(near[:, 0] < tree.n)
+    distance, near = distance[some], near[some]
     within = near < tree.n
     near = np.where(within, near, 0)
-    cosine = np.where(within, np.einsum("nd,nkd->nk", features, others[near]), -1.0).astype(np.float64)
+    cosine = np.where(within, (others[near] @ features[some][:, :, None])[:, :, 0], -1.0).astype(np.float64)
     best = cosine.argmax(axis=1)
-    row = np.arange(len(points))
+    row = np.arange(len(some))
     highest = cosine[row, best]
     among = (np.exp((cosine - highest[:, None]) / _TEMPERATURE) * within).sum(axis=1)
     closeness = np.maximum(1.0 - (distance[row, best] / radius) ** 2, 0.0) ** 2
-    weight = np.maximum(highest, 0.0) ** _SHARPNESS * closeness / np.maximum(among, 1.0)
-    return near[row, best], np.where(within[row, best], weight, 0.0)
+    match, weight = np.zeros(len(points), dtype=np.int64), np.zeros(len(points))
+    match[some] = near[row, best]
+    weight[some] = np.maximum(highest, 0.0) ** _SHARPNESS * closeness / np.maximum(among, 1.0)
+    return match, weight
