@@ -100,7 +100,9 @@ def rounded(points: Array, name: str) -> None:
         single = some.astype(np.float32)
         kept_so = (single == some).all(axis=0)
         steps = np.where(kept_so, np.spacing(away.astype(np.float32)), 0.0)
-        units = 10.0 ** (np.floor(np.log10(np.where(some == 0.0, 1.0, np.maximum(np.abs(some), _TINY)))) - 5.0)
+        units = 10.0 ** (
+            np.floor(np.log10(np.where(some == 0.0, 1.0, np.maximum(np.abs(some), _TINY)))) - 5.0
+        )
         written_so = bool((np.abs(some / units - np.round(some / units)) < _WHOLE).all())
     step = float(steps.max())
     sixths = 10.0 ** (np.floor(np.log10(np.maximum(away, _TINY))) - 5.0)

@@ -1,0 +1,92 @@
+# SPDX-License-Identifier: MIT
+"""Rolling ground without anything upright: a right pose is not "failed" for want of walls; two places are not "ok"."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+import hybridreg as hr
+from hybridreg.evidence.evidence import Evidence
+from hybridreg.geometry import se3
+from hybridreg.verdict.confidence import confidence
+
+Array = NDArray[np.float64]
+_RANGES = np.arange(2.0, 70.0, 0.05)
+
+
+def height(x: Array, y: Array, seed: int) -> Array:
+    """Hills of some metres, some ten metres wide, with waves of a decimetre on them."""
+    rng = np.random.default_rng([seed, 4])
+    total = np.zeros_like(x)
+    for size, width, n in ((1.3, 0.16, 6), (0.04, 1.5, 8)):
+        for _ in range(n):
+            a, b, phase = rng.normal(0.0, width), rng.normal(0.0, width), rng.uniform(0.0, 6.28)
+            total = total + size * np.sin(a * x + b * y + phase)
+    return total
+
+
+def scan(x: float, y: float, yaw_deg: float, beams: int, seed: int) -> tuple[Array, Array]:
+    """Points (n, 3) of a spinning sensor 1.8 m over the hills, and its pose (4, 4)."""
+    origin = np.array([x, y, float(height(np.array(x), np.array(y), seed)) + 1.8])
+    T = se3.from_rt(se3.yaw(yaw_deg)[:3, :3], origin)
+    azimuth, elevation = np.meshgrid(
+        np.radians(np.arange(0.0, 360.0, 0.5)), np.radians(np.linspace(-25.0, 10.0, beams)), indexing="ij"
+    )
+    rays = np.stack(
+        [np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation)], axis=-1
+    ).reshape(-1, 3)
+    points = []
+    for part in np.array_split(rays @ T[:3, :3].T, 40):
+        along = origin + part[:, None, :] * _RANGES[:, None]
+        under = along[..., 2] < height(along[..., 0], along[..., 1], seed)
+        hit = under.any(axis=1)
+        points.append(along[hit, under[hit].argmax(axis=1)])
+    world = np.concatenate(points)
+    noise = np.random.default_rng(seed).normal(0.0, 0.015, world.shape)
+    return se3.apply(se3.inverse(T), world) + noise, T
+
+
+@pytest.mark.parametrize("seed", [1, 3])
+def test_a_right_pose_on_hills_has_not_failed(seed: int) -> None:
+    source, T_source = scan(0.0, 0.0, 40.0, 32, seed)
+    target, T_target = scan(7.0, 3.0, -70.0, 24, seed)
+    result = hr.register(source, target)
+    off = se3.inverse(se3.inverse(T_target) @ T_source) @ result.transformation
+    assert np.linalg.norm(off[:3, 3]) < 0.3
+    assert result.verdict != "failed"
+
+
+def test_hills_of_two_places_are_not_ok() -> None:
+    source, _ = scan(0.0, 0.0, 40.0, 32, 1)
+    target, _ = scan(7.0, 3.0, -70.0, 24, 2)
+    assert hr.register(source, target).verdict == "failed"
+
+
+_ON_HILLS = {
+    "agreement_least": 0.0, "agreement_middle": 0.0, "agreement_most": 0.88, "looked_least": 0.0,
+    "looked_through": 0.002, "looked_through_source": 0.002, "looked_through_target": 0.002, "agreement_rare": 0.0,
+    "looked_through_rare": 0.0, "agreed_rare": 0.0, "through_rare": 0.0, "relief_cells": 0.0,
+    "relief_correlation": 0.0, "weakest": 0.011, "found_by": 1.0, "matched": 0.0, "closeness": 0.0, "overturned": 0.0,
+    "support": -0.65, "rival_margin": -5.5, "compared": 3000.0, "visible_source": 0.58, "visible_target": 0.6,
+    "fitness_visible_source": 0.9, "fitness_visible_target": 0.9, "closely": 0.5,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    "against",
+    [
+        {"agreement_most": 0.7},
+        {"looked_through": 0.05},
+        {"weakest": 0.0005},
+        {"visible_source": 0.05},
+        {"rival_margin": -1.0},
+    ],
+)
+def test_what_speaks_against_a_pose_counts(against: dict[str, float]) -> None:
+    poor = Evidence(**_ON_HILLS | {"closely": -1.0, "fitness_visible_source": 0.4, "support": -3.0})
+    assert confidence(poor) == 0.5
+    assert confidence(replace(poor, **against)) < 0.5
