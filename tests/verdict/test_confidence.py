@@ -8,6 +8,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+import hybridreg as hr
+from hybridreg.data.hard import sample
+from hybridreg.data.hard.true_poses import is_right
 from hybridreg.evidence.evidence import NO_RIVAL, Evidence
 from hybridreg.evidence.log_odds import FAILED, OK, OK_LOG_ODDS, beside, log_odds, model, terms
 from hybridreg.verdict.boosted import Boosted
@@ -170,3 +173,9 @@ def test_a_pair_turned_round_has_the_same_support_and_confidence(evidence: Evide
     )
     assert log_odds(round_about) == log_odds(evidence)
     assert features(round_about) == features(evidence)
+
+
+def test_relief_alone_makes_no_pose_ok_that_all_walls_contradict() -> None:
+    made = sample("merged", 453)  # half a turn off the ground's waves fit
+    result = hr.register(made.source, made.target)
+    assert is_right(made, result.transformation) or result.verdict != "ok"

@@ -28,7 +28,9 @@ def traffic(rng: np.random.Generator, seed: int) -> Sample:
 def _road(seed: int, ahead: float) -> Place:
     # The same road for a seed, its vehicles `ahead` metres further.
     rng = np.random.default_rng([seed, 7])
-    place = Place()  # level: a place's relief nearly repeats after nine metres, and would agree where traffic does
+    place = (
+        Place()
+    )  # level: a place's relief nearly repeats after nine metres, and would agree where traffic does
     high, aside = (float(rng.uniform(3.0, 5.0)), 12.0) if rng.random() < 0.5 else (0.8, 10.0)
     for side in (-1.0, 1.0):
         place.box(0.0, side * aside, 0.0, (190.0, 0.3, high))
