@@ -42,8 +42,8 @@ CLEAR = 4.5
 # Of 19 pairs of different places (`sim:val`, hard kinds with even seeds) none comes near all of these.
 _ALL, _NONE, _HELD, _SEEN = 0.85, 0.01, 0.005, 0.3
 # Agreeing share of the middle axis below which the pose is not "ok" where so many points face the rarest; by hand. Of
-# some 30 right poses on fields and in maps (`sim:val/degenerate`, hard kinds with even seeds) 0.39 of the points that do
-# not face the commonest axis agree at least; a wrong one on made relief, half a turn off, has 0.01.
+# some 30 right poses on fields and in maps (`sim:val/degenerate`, hard kinds with even seeds) 0.39 or more of the
+# points agree that do not face the commonest axis; of a wrong one on made relief, half a turn off, 0.01.
 _HARDLY, _FACING = 0.1, 60
 # Log-odds by which a rival may be likelier and still count as equal; by hand.
 _EQUAL = 1.0
