@@ -34,6 +34,8 @@ _ALIKE = 0.5
 _MOST = 0.15
 # Factors of the heights within this are none; of 18 right poses of real pairs none is strained by more than 0.05.
 _HEIGHTS = 0.15
+# Factors beyond this, or below one over it, lay a field flat: no unit of heights differs so much; by hand.
+_TALLEST = 3.5
 
 
 class Stretch(NamedTuple):
@@ -57,21 +59,30 @@ def stretch(views: Views, T_target_source: Array, close: float, offset: RangeOff
     up = _up(views, T_target_source)
     if up is None:
         return None
-    for strains, read in ((_level(up), _along_the_ground), (np.outer(up, up)[None], _of_heights)):
-        fitted = fit(views, T_target_source, strains).T
-        left = fitted[:3, :3] @ se3.project(fitted[:3, :3]).T
-        found = read(views, up, (left + left.T) / 2.0)
-        enough = closeness(views.fine, fitted) - _GAIN
-        if found is None or enough < close or (offset is not None and offset.explains(views, fitted)):
-            continue
-        near_by = fit(views, T_target_source, NO_STRAIN).T  # a pose may gain as much
-        if enough >= closeness(views.fine, near_by):
-            return found
+    upright = np.outer(up, up)[None]
+    for strains, read, tries in ((_level(up), _along_the_ground, 2), (upright, _of_heights, 1)):
+        start = T_target_source
+        for _ in range(tries):
+            fitted = fit(views, start, strains).T
+            found = read(views, up, fitted)
+            if found is None:
+                break
+            explained = offset is not None and offset.explains(views, fitted)
+            if _is_better(views, T_target_source, close, fitted) and not explained:
+                return found
+            # Far points may have found no partners, and the fit stopped half-way: on from twice the strain.
+            start = fitted @ np.linalg.inv(T_target_source) @ fitted
     return None
 
 
-def _along_the_ground(views: Views, up: Array, strain: Array) -> Stretch | None:
-    factors, directions = np.linalg.eigh(strain)
+def _is_better(views: Views, T: Array, close: float, fitted: Array) -> bool:
+    # Than the pose, and than any near by.
+    enough = closeness(views.fine, fitted) - _GAIN
+    return enough >= close and enough >= closeness(views.fine, fit(views, T, NO_STRAIN).T)
+
+
+def _along_the_ground(views: Views, up: Array, fitted: Array) -> Stretch | None:
+    factors, directions = np.linalg.eigh(_strain(fitted))
     level = np.argsort(np.abs(up @ directions))[:2]
     k, across = level[np.argsort(-np.abs(factors[level] - 1.0))]
     most = abs(factors[k] - 1.0)
@@ -80,9 +91,16 @@ def _along_the_ground(views: Views, up: Array, strain: Array) -> Stretch | None:
     return Stretch(float(factors[k]), directions[:, k], float(factors[across]))
 
 
-def _of_heights(views: Views, up: Array, strain: Array) -> Stretch | None:
-    factor = float(up @ strain @ up)
-    return Stretch(factor, up, 1.0) if abs(factor - 1.0) > _HEIGHTS else None
+def _of_heights(views: Views, up: Array, fitted: Array) -> Stretch | None:
+    factor = float(up @ _strain(fitted) @ up)
+    strained = abs(factor - 1.0) > _HEIGHTS and 1.0 / _TALLEST < factor < _TALLEST
+    return Stretch(factor, up, 1.0) if strained else None
+
+
+def _strain(fitted: Array) -> Array:
+    # What is left (3, 3) of an affine map (4, 4) without its rotation.
+    left = fitted[:3, :3] @ se3.project(fitted[:3, :3]).T
+    return (left + left.T) / 2.0
 
 
 def _reach(views: Views) -> float:
