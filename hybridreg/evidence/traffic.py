@@ -37,8 +37,8 @@ _FEW = 20.0
 _POINTS, _VEHICLES = 40, 3
 # Metres along the road over which they are spread, at least: in a room walls are no larger than lorries; by hand.
 _SPREAD = 12.0
-# Nats from which the ground's relief holds the pose by itself: of a made motorway with relief that nearly repeats 77 at
-# a wrong pose, of real roads some hundreds at the right one; by hand.
+# Nats from which the ground's relief holds the pose by itself, by hand: real roads have some hundreds at the right one,
+# made relief that repeats every nine metres had 77 and 132 at wrong ones.
 _TELLS = 100.0
 
 _GROUND, _FIXED = -1, 0
