@@ -53,8 +53,8 @@ class Candidates(Stage):
     Every pose that an entry offers is settled and ranked by its log-odds (`hybridreg.evidence.log_odds`), the best are
     refined, and the best of these is weighed with the others as its rivals. A pose that several entries found is more
     credible; a rival that turns out likelier takes its place. Later entries are not run once the confidence is
-    `enough`. Where none brings it, all starts are examined a second time. What was not chosen is returned as `rivals`,
-    what each entry did as `entries`.
+    `enough`, or would be if the source were not deformed: no pose is right then. Where none brings it, all starts are
+    examined a second time. What was not chosen is returned as `rivals`, what each entry did as `entries`.
 
     Parameters
     ----------
@@ -94,21 +94,22 @@ class Candidates(Stage):
         likelier: list[Hypothesis] = []
         traces: list[EntryTrace] = []
         beyond: list[Hypothesis | Array] = []
-        pose, confidence = Pose.unknown(len(matches)), 0.0
+        pose, confidence, undeformed = Pose.unknown(len(matches)), 0.0, 0.0
         for every in self._worth_trying(scene).stages(scene, matches, rng, traces, beyond):
             found = distinct(scene, [*(one for one in every if scene.pair.allows(one.T)), *likelier])
             if not found:
                 continue
-            pose, confidence = as_pose(found), 0.0
+            pose, confidence, undeformed = as_pose(found), 0.0, 0.0
             # To weigh a pose takes as long as to find some, and one that is rather wrong is not "ok".
             if found[0].log_odds > _LIKELY:
                 found, pose = self._weighed(scene, found, likelier)
-                confidence = pose.weighed.confidence
-            if confidence >= self.enough:
+                confidence, undeformed = pose.weighed.confidence, pose.weighed.undeformed
+            if undeformed >= self.enough:
                 break
         with scene.clock.phase("verdict"):
             told = shut_out.explanations(scene, beyond, found, sure=confidence >= self.enough)
-            if not told and confidence < _SURE:
+            # One that is deformed has its explanation.
+            if not told and confidence < _SURE and confidence == undeformed:
                 told = input_mistakes.explanations(scene, thorough=confidence >= DOUBTED)
             scene.explanations.extend(told)
         won = found[0].came_from if found else None

@@ -65,9 +65,18 @@ class Doubts:
     traffic: Array | None = None
 
     def __bool__(self) -> bool:
-        found = any(one is not None for one in (self.slack, self.stretch, self.traffic))
-        beyond = self.range_offset is not None and self.range_offset.beyond
-        return self.through_walls or self.alike or self.lone_thing or found or beyond
+        return self.about_pose or self.about_source
+
+    @property
+    def about_pose(self) -> bool:
+        """Whether another pose may be right."""
+        found = self.slack is not None or self.traffic is not None
+        return self.through_walls or self.alike or self.lone_thing or found
+
+    @property
+    def about_source(self) -> bool:
+        """Whether the source is deformed, so that no pose is right."""
+        return self.stretch is not None or (self.range_offset is not None and self.range_offset.beyond)
 
     @classmethod
     def about(

@@ -49,6 +49,8 @@ class Weighed:
         How far away the surfaces draw the pose to where they fit better, where that decides: beyond the tolerance of
         one that would be "ok", within it of one that would have failed.
     confidence : float in (0, 1)
+    undeformed : float in (0, 1)
+        What it would be if no deformation of the source were found. No search finds a better pose then.
     """
 
     at: PoseEvidence
@@ -57,6 +59,7 @@ class Weighed:
     doubts: Doubts
     drawn: Tolerance | None
     confidence: float
+    undeformed: float
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -140,23 +143,31 @@ def weigh(scene: Scene, pose: Pose) -> Weighed:
     own, *found = told_apart([own, *(one for one in offered if scene.pair.allows(one.T))])
     found = best(found)
     evidence = evidence_of(own, found, at.size if pose.found else Size())
-    probability, doubts = _believed(scene, at, found, evidence)
+    believed, doubts = _believed(scene, at, found, evidence)
+    probability = min(believed, DOUBTED) if doubts else believed
     drawn = None
     if pose.found and not FAILED <= probability <= DOUBTED and not evidence.overturned:
         drawn = _drawn(scene, at, found, ok=probability > DOUBTED)
         probability = (DOUBTED if probability > DOUBTED else FAILED) if drawn else probability
-    return Weighed(at=at, rivals=found, evidence=evidence, doubts=doubts, drawn=drawn, confidence=probability)
+    return Weighed(
+        at=at,
+        rivals=found,
+        evidence=evidence,
+        doubts=doubts,
+        drawn=drawn,
+        confidence=probability,
+        undeformed=believed if doubts.about_source and not doubts.about_pose else probability,
+    )
 
 
 def _believed(
     scene: Scene, at: PoseEvidence, found: list[Hypothesis], evidence: Evidence
 ) -> tuple[float, Doubts]:
-    # The probability by the trees, bounded by what they do not see.
+    # The probability by the trees, and what they do not see.
     probability = confidence(evidence)
     if probability < FAILED and is_right_but_for_size(scene, at, evidence):
         probability = FAILED
-    doubts = Doubts.about(scene, at, found, evidence, likely=probability >= FAILED)
-    return min(probability, DOUBTED) if doubts else probability, doubts
+    return probability, Doubts.about(scene, at, found, evidence, likely=probability >= FAILED)
 
 
 def _alone(scene: Scene, at: PoseEvidence, found_by: int = 1) -> Hypothesis:
@@ -187,7 +198,8 @@ def _is_ok(scene: Scene, at: PoseEvidence, found: list[Hypothesis]) -> bool:
     apart = [one.but(closeness=0.0) for one in found if differs(one.T, at.T, centre, spacing)]
     own, *others = told_apart([_alone(scene, at), *apart])
     evidence = evidence_of(own, best(others), at.size)
-    return _believed(scene, at, others, evidence)[0] >= OK
+    probability, doubts = _believed(scene, at, others, evidence)
+    return probability >= OK and not doubts
 
 
 def evidence_of(own: Hypothesis, found: list[Hypothesis], size: Size) -> Evidence:
