@@ -37,7 +37,7 @@ class VoxelGrid(Stage):
     voxel : float or None
         Edge of a cell, metres. None derives one length for both clouds from their extents
         (`hybridreg.resolution.default_voxel`), a longer one where a cloud would otherwise keep more than 30,000
-        points, and notes it in the result. A cloud of more than a million and a half points is first thinned to
+        points, and notes it in the result. A cloud of more than 900,000 points is first thinned to
         cells of a quarter of that (`hybridreg.thinning`).
     density : "keep" or "match"
         "match" gives each cloud the voxel at which both have about as many points per occupied volume; for a

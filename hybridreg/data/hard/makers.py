@@ -23,6 +23,7 @@ from hybridreg.data.hard.true_poses import Maker, Sample
 _MAKERS: dict[str, Maker] = {
     "map-ground": maps.map_ground,
     "map-sensor": maps.map_sensor,
+    "tiles": maps.tiles,
     "base-link": vehicles.base_link,
     "merged": vehicles.several,
     "depth-room": rooms.depth_room,

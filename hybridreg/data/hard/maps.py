@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Fused maps of many stops, outdoors or of a floor of several rooms, against a scan; the origin of their frames is a
-sensor's position or not."""
+"""Fused maps of many stops, outdoors or of a floor of several rooms, against a scan or one another; the origin of their
+frames is a sensor's position or not."""
 
 from __future__ import annotations
 
@@ -75,6 +75,25 @@ def _frame(place: Place, fused: Shot, rng: np.random.Generator) -> Array:
     ground = float(place.height(x, y))
     lift = {"on": 0.0, "in": -rng.uniform(0, 0.2), "over": rng.uniform(0, 0.2), "below": -rng.uniform(1, 8)}
     return pose(x, y, ground + lift[str(where)], yaw)
+
+
+def tiles(rng: np.random.Generator, seed: int) -> Sample:
+    """Two parts of one neighbourhood, mapped one after another: they share a strip, or nothing but waves of the ground,
+    which repeat."""
+    place = outdoors(rng, 0)
+    rays = lidar(str(rng.choice(AROUND[:3])), rng, far=45.0, columns=300)
+    along = np.arange(-30.0, 31.0, 6.0) + rng.uniform(-1.0, 1.0)
+    path = [*np.c_[along, 0.0 * along], *np.c_[0.0 * along, along][np.abs(along) > 2.0]]
+    stops = [base(place, x, y, rng.uniform(-20, 20)) @ mount(rng) for x, y in path]
+    shots = [look(place.world(), rays, T, rng) for T in stops]
+    over, across = rng.uniform(-5.0, 14.0), int(rng.integers(2))
+    parts = []
+    for side, share in ((1.0, shots[::2]), (-1.0, shots[1::2])):
+        whole = merged(share, pose(0.0, 0.0, 0.0, 0.0))
+        part = whole.kept(side * whole.points[:, across] < over)
+        frame = pose(*rng.uniform(-20.0, 20.0, 2), rng.uniform(-2.0, 0.0), rng.uniform(0.0, 360.0))
+        parts.append(thin(part.within(frame), rng.uniform(0.2, 0.3)))
+    return judged(parts[0], parts[1], METRES, GRAIN)
 
 
 def building(rng: np.random.Generator, seed: int) -> Sample:
