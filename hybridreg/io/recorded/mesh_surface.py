@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybridreg.io.faults import fault, foreign_parser
+from hybridreg.io.recorded.gltf_positions import check_positions
 from hybridreg.io.recorded.recording import Recorded, Selection
 from hybridreg.runtime.optional_packages import load
 
@@ -29,12 +30,14 @@ def read_mesh(path: Path, selection: Selection) -> Recorded:
     Raises
     ------
     ValueError
-        Damaged, empty, or with faces that are not finite or have no area.
+        Damaged, empty, with faces that are not finite or have no area, or as `check_positions`.
     ImportError
         Without trimesh.
     """
     name = str(path)
     trimesh = load("trimesh", f"{name}: a mesh")
+    if path.suffix.lower() in (".glb", ".gltf"):
+        check_positions(path, name)
     with foreign_parser(name, "a mesh"):
         loaded = trimesh.load(name, process=False)
         parts = loaded.dump() if isinstance(loaded, trimesh.Scene) else [loaded]
