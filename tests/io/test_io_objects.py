@@ -477,6 +477,9 @@ def test_meshes_of_meshio_pyntcloud_and_pymeshlab_are_no_clouds() -> None:
         )
 
     same(SimpleNamespace(points=P, cells=[]))
+    same(SimpleNamespace(vertices=P, cells=[[0], [1, 2]]))
+    # vedo 2026.6.3, whose cells are lists of corners: its meshes were read as their vertices
+    assert "x.vertices" in refused(SimpleNamespace(vertices=P, cells=[[0, 1, 2]]))
     same(meshio("vertex", np.arange(len(P))[:, None]))
     same(SimpleNamespace(points=points, mesh=None))
     same(meshlab(0))
@@ -484,6 +487,13 @@ def test_meshes_of_meshio_pyntcloud_and_pymeshlab_are_no_clouds() -> None:
         assert "a mesh is not a cloud; sample its surface, or pass its vertices, x.points" in refused(mesh)
     assert "x.transformed_vertex_matrix()" in refused(meshlab(1))
     assert "x.current_mesh()" in refused(SimpleNamespace(current_mesh=lambda: meshlab(0)))
+
+
+def test_reconstructions_of_pycolmap() -> None:
+    # As pycolmap 4.2.1 keeps them; they were refused with a cure that led nowhere, "pass what its read() returns".
+    points = {7 * k: SimpleNamespace(xyz=p, color=np.zeros(3, np.uint8)) for k, p in enumerate(P)}
+    same(SimpleNamespace(points3D=points, read=lambda path: None))
+    assert "empty" in refused(SimpleNamespace(points3D={}, read=lambda path: None))
 
 
 def test_epochs_of_py4dgeo() -> None:
