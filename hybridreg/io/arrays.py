@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -99,12 +100,23 @@ def _shape_cure(array: NDArray[Any], batched: bool) -> str:
     return "give one row a point: numpy.column_stack([x, y, z])"
 
 
-def _of_fields(array: NDArray[Any], name: str) -> Array:
-    names = array.dtype.names or ()
-    raw = [each for each in _LAS_ONLY if each in names]
+def refuse_raw_las(names: Sequence[str], name: str) -> None:
+    """Refuse the fields of LAS as they are stored, as laspy's `points.array` and lazpy's `arrays()` hold them.
+
+    Raises
+    ------
+    ValueError
+        One of the names is a field of LAS, and the coordinates are called X, Y and Z.
+    """
+    raw = [each for each in names if each.lower() in _LAS_ONLY]
     if raw and "X" in names:
         problem = f"is a raw LAS record (it has {raw[0]!r}), its X, Y and Z are not scaled"
         raise fault(name, problem, "give what laspy.read returns, or its xyz")
+
+
+def _of_fields(array: NDArray[Any], name: str) -> Array:
+    names = array.dtype.names or ()
+    refuse_raw_las(names, name)
     lowered = [each.lower() for each in names]
     together = next((lowered.index(each) for each in TOGETHER if each in lowered), None)
     if together is not None and "x" not in lowered:

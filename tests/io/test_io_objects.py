@@ -427,6 +427,14 @@ def test_laspy() -> None:
     same(las, grid)
     same(las.points, grid)
     assert "laspy.read" in refused(las.points.array)
+    # The same as a table, as many make it, or as lazpy 0.9.2's `arrays()`: thousandths were read as metres.
+    columns = {each: las.points.array[each] for each in las.points.array.dtype.names}
+    assert "laspy.read" in refused(columns)
+    assert "laspy.read" in refused(
+        {**{axis: columns[axis] for axis in "XYZ"}, "point_source_ID": np.zeros(60)}
+    )
+    assert "laspy.read" in refused(pytest.importorskip("pandas").DataFrame(columns))
+    same({**columns, **dict(zip("XYZ", grid.T, strict=True))}, grid)  # scaled beforehand
 
 
 def test_trimesh() -> None:
