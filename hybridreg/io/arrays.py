@@ -24,6 +24,9 @@ TOGETHER = ("xyz", "points", "point", "positions", "position", "pos", "coords", 
 _MOST_CHANNELS = 6
 # Sensors have eight rows or more; a stack with fewer is more likely several clouds.
 _FEWEST_ROWS = 8
+# What poses have, and rotations, one after another; and by how much R R^T of one may be off.
+_POSES = ((4, 4), (3, 4), (3, 3))
+_NO_ROTATION = 1e-3
 # Of a raw LAS record: its X, Y and Z are whole numbers still to be scaled.
 _LAS_ONLY = ("bit_fields", "raw_classification", "point_source_id")
 
@@ -58,6 +61,7 @@ def array_points(array: NDArray[Any], name: str, *, batched: bool = False, cure:
 
 def _rows(array: NDArray[Any], name: str, batched: bool) -> NDArray[Any]:
     shape = array.shape
+    _refuse_poses(array, name)
     if array.ndim == 3 and {shape[0], shape[2]} & {3, 4}:
         check_photo(array, name)
     if array.ndim == 2 and shape[0] in range(3, _MOST_CHANNELS + 1) and shape[1] >= FEWEST:
@@ -83,6 +87,20 @@ def _rows(array: NDArray[Any], name: str, batched: bool) -> NDArray[Any]:
     if flat.ndim == 2 and min(flat.shape) > _MOST_CHANNELS:
         refuse_image(flat.shape[0], flat.shape[1], name)
     raise fault(name, f"expected an array of shape (N, 3), got {shape}", _shape_cure(array, batched))
+
+
+def _refuse_poses(array: NDArray[Any], name: str) -> None:
+    # A trajectory has the shape of an organised cloud, and its rotations would be points at 1 m from the origin.
+    if array.ndim != 3 or array.shape[1:] not in _POSES:
+        return
+    R = np.ma.getdata(array)[:, :3, :3].astype(np.float64)
+    with np.errstate(over="ignore", invalid="ignore"):
+        off = np.abs(R @ np.swapaxes(R, 1, 2) - np.eye(3)).max(initial=0.0)
+    if off < _NO_ROTATION:
+        where = "; their positions are x[:, :3, 3]" if array.shape[2] == 4 else ""
+        raise fault(
+            name, f"its shape {array.shape} holds {len(array)} poses, not points", f"give a cloud{where}"
+        )
 
 
 def _without_first(array: NDArray[Any]) -> str:

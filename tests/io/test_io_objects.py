@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from hybridreg import PointCloud
 
@@ -105,6 +106,20 @@ def test_several_clouds_are_not_one() -> None:
     assert "x[0]" in refused(torch.tensor(np.stack([P] * 16)))
     assert "x[0]" in refused(torch.tensor(P.T)[None])
     same(torch.tensor(P)[None])
+
+
+@pytest.mark.parametrize("shape", [(4, 4), (3, 4), (3, 3)])
+def test_a_trajectory_is_no_organised_cloud(shape: tuple[int, int]) -> None:
+    # Rotations were read as points at 1 m from the origin.
+    T = np.tile(np.eye(4), (100, 1, 1))
+    T[:, :3, :3] = Rotation.from_rotvec(np.linspace(0.0, 3.0, 100)[:, None] * [0.0, 0.0, 1.0]).as_matrix()
+    T[:, :3, 3] = np.linspace(0.0, 50.0, 300).reshape(100, 3)
+    poses = T[:, : shape[0], : shape[1]]
+    for given in (poses, list(poses), poses.astype(np.float32)):
+        assert "holds 100 poses, not points" in refused(given)
+    assert ("x[:, :3, 3]" in refused(poses)) == (shape[1] == 4)
+    scan = np.concatenate([P.reshape(20, 3, 3), np.ones((20, 3, 1))], axis=2)[:, : shape[0], : shape[1]]
+    assert len(PointCloud.of(scan)) == 60  # an organised cloud of three columns
 
 
 def test_a_column_that_counts_is_no_coordinate() -> None:
