@@ -17,6 +17,7 @@ _HEAD = struct.Struct(
     "<4s2I2I"
 )  # magic, version, length of the file; length and type of the first chunk, the JSON
 _DRACO = "KHR_draco_mesh_compression"
+_INSTANCES = "EXT_mesh_gpu_instancing"
 _MESHOPT = ("EXT_meshopt_compression", "KHR_meshopt_compression")
 
 
@@ -25,7 +26,7 @@ def check_positions(path: Path, name: str) -> None:
 
     Of an accessor (glTF 2.0, section 3.6.2) it leaves out `normalized`: whole numbers that stand for 0 to 1 stay up to
     65535. It leaves out `sparse`: what is stored apart stays zero. Compressed positions are zeros where it lacks the
-    decoder.
+    decoder. Of the instances of a mesh that stand in one node it gives one.
 
     Raises
     ------
@@ -36,6 +37,7 @@ def check_positions(path: Path, name: str) -> None:
         document = _document(path, name)
         accessors = list(_accessors(document))
         required = {str(each) for each in document.get("extensionsRequired", ())}
+        used = {str(each) for each in document.get("extensionsUsed", ())}
     except (ValueError, LookupError, TypeError, AttributeError, struct.error):
         return
     packed = next((each for each in _MESHOPT if each in required), None)
@@ -45,6 +47,9 @@ def check_positions(path: Path, name: str) -> None:
         )
     if packed is not None:
         raise fault(name, f"is compressed by {packed}", "export it without compression")
+    if _INSTANCES in used:
+        problem = f"places copies of a surface by {_INSTANCES}"
+        raise fault(name, problem, "export it without instances, each copy as a node of its own")
     if any(each.get("normalized") for each in accessors):
         problem = "its positions are whole numbers that stand for fractions (normalized)"
         raise fault(name, problem, "export it without quantization, with positions as floats")

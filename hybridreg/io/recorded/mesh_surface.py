@@ -30,7 +30,8 @@ def read_mesh(path: Path, selection: Selection) -> Recorded:
     Raises
     ------
     ValueError
-        Damaged, empty, with faces that are not finite or have no area, or as `check_positions`.
+        Damaged, empty, with faces that are not finite or have no area, with points beside its surfaces, or as
+        `check_positions`.
     ImportError
         Without trimesh.
     """
@@ -42,9 +43,16 @@ def read_mesh(path: Path, selection: Selection) -> Recorded:
         loaded = trimesh.load(name, process=False)
         parts = loaded.dump() if isinstance(loaded, trimesh.Scene) else [loaded]
         meshes = [part for part in parts if len(getattr(part, "faces", ()))]
+        loose = sum(len(part.vertices) for part in parts if isinstance(part, trimesh.PointCloud))
         if meshes:
             triangles = np.vstack([np.asarray(mesh.triangles, dtype=np.float64) for mesh in meshes])
         points = [np.asarray(part.vertices, dtype=np.float64) for part in parts if len(part.vertices)]
+    if meshes and loose:  # which of them was scanned? A marker of axes is a surface too
+        raise fault(
+            name,
+            f"holds surfaces and {loose} points beside them",
+            "export only the points, or only the surfaces",
+        )
     if meshes:
         return Recorded(spread_over(triangles, name), NO_PLACE)
     if not points:

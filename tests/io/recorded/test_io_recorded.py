@@ -305,8 +305,8 @@ def gltf(tmp_path: Path, kind: str, *, ending: str = "glb") -> Path:
         where = {"bufferView": 0, "componentType": 5123}
         accessor["sparse"] = {"count": 50, "indices": where, "values": {"bufferView": 1}}
         del accessor["bufferView"]
-    if kind.endswith("compression"):
-        extra = {"extensionsRequired": [kind]}
+    if kind.startswith(("EXT", "KHR")):
+        extra = {"extensionsRequired": [kind], "extensionsUsed": [kind]}
     document = {
         "asset": {"version": "2.0"},
         "scene": 0,
@@ -347,9 +347,20 @@ def test_positions_of_gltf_that_trimesh_gives_as_other_numbers_are_refused(
         ("normalized", "without quantization"),
         ("sparse", "all in one place"),
         ("EXT_meshopt_compression", "without compression"),
+        ("EXT_mesh_gpu_instancing", "without instances"),  # of which it gives one
     ):
         with pytest.raises(ValueError, match=rf"a\.{ending}: .*{cure}"):
             read_points(gltf(tmp_path, kind, ending=ending))
+
+
+def test_a_scene_of_points_and_surfaces_is_refused(tmp_path: Path) -> None:
+    # Of a scan with a marker of axes beside it the marker was read.
+    trimesh = pytest.importorskip("trimesh")
+    trimesh.Scene([trimesh.PointCloud(HUNDRED), trimesh.creation.box()]).export(tmp_path / "a.glb")
+    with pytest.raises(
+        ValueError, match=r"holds surfaces and 100 points beside them; export only the points"
+    ):
+        read_points(tmp_path / "a.glb")
 
 
 def test_draco_needs_its_decoder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
