@@ -353,14 +353,17 @@ def test_positions_of_gltf_that_trimesh_gives_as_other_numbers_are_refused(
             read_points(gltf(tmp_path, kind, ending=ending))
 
 
-def test_a_scene_of_points_and_surfaces_is_refused(tmp_path: Path) -> None:
-    # Of a scan with a marker of axes beside it the marker was read.
+def test_points_that_no_surface_holds_are_not_left_out_in_silence(tmp_path: Path) -> None:
+    # Of a scan with a marker of axes beside it the marker alone was read.
     trimesh = pytest.importorskip("trimesh")
     trimesh.Scene([trimesh.PointCloud(HUNDRED), trimesh.creation.box()]).export(tmp_path / "a.glb")
-    with pytest.raises(
-        ValueError, match=r"holds surfaces and 100 points beside them; export only the points"
-    ):
-        read_points(tmp_path / "a.glb")
+    rows = "".join(f"{x!r} {y!r} {z!r}\n" for x, y, z in HUNDRED.tolist())
+    vertices = "".join(f"v {row}\n" for row in rows.splitlines())
+    (tmp_path / "a.obj").write_text(vertices + "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 101 102 103\n")
+    (tmp_path / "a.off").write_text(f"OFF\n100 1 0\n{rows}3 0 1 2\n")
+    for ending, loose in (("glb", 100), ("obj", 100), ("off", 97)):
+        with pytest.raises(ValueError, match=f"surfaces and {loose} points that belong to none; export only"):
+            read_points(tmp_path / f"a.{ending}")
 
 
 def test_draco_needs_its_decoder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
