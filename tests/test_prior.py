@@ -391,9 +391,9 @@ def test_a_result_in_place_of_its_pose_is_told(held: str) -> None:
         Prior(init=SimpleNamespace(**{held: TURNED}))
 
 
-@pytest.mark.parametrize("held", ["matrix", "as_matrix"])
+@pytest.mark.parametrize("held", ["matrix", "as_matrix", "to_mat", "to_homogeneous", "to_homogenous_matrix"])
 def test_a_pose_of_another_library_in_place_of_its_matrix_is_told(held: str) -> None:
-    # gtsam 4.3.0's Pose3 has the first, scipy 1.17's RigidTransform the second.
+    # As gtsam 4.3.0, scipy 1.17, evalio 0.6.1, roma 1.8.0 and symforce 0.12.0 call it.
     with pytest.raises(ValueError, match=rf"init: expected numbers .*; give its {held}\(\)"):
         Prior(init=SimpleNamespace(**{held: lambda: TURNED}))
 

@@ -13,8 +13,18 @@ Array = NDArray[np.float64]
 # R R^T of a rotation in double precision is off by less.
 _EXACT = 1e-12
 # Where results of registrations keep their pose: ours and Open3D's, small_gicp's. Where other libraries' poses keep
-# their matrix: gtsam and Sophus, scipy, pinocchio, the kit of Argoverse 2.
-_HOLD = ("transformation", "T_target_source", "matrix", "as_matrix", "homogeneous", "transform_matrix")
+# their matrix: gtsam and Sophus, scipy, pinocchio, the kit of Argoverse 2; evalio, roma, symforce.
+_HOLD = (
+    "transformation",
+    "T_target_source",
+    "matrix",
+    "as_matrix",
+    "homogeneous",
+    "transform_matrix",
+    "to_mat",
+    "to_homogeneous",
+    "to_homogenous_matrix",
+)
 
 
 def from_rt(R: Array, t: Array) -> Array:

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -23,6 +24,9 @@ TOGETHER = ("xyz", "points", "point", "positions", "position", "pos", "coords", 
 _MOST_CHANNELS = 6
 # Sensors have eight rows or more; a stack with fewer is more likely several clouds.
 _FEWEST_ROWS = 8
+# What poses have, and rotations, one after another; and by how much R R^T of one may be off.
+_POSES = ((4, 4), (3, 4), (3, 3))
+_NO_ROTATION = 1e-3
 # Of a raw LAS record: its X, Y and Z are whole numbers still to be scaled.
 _LAS_ONLY = ("bit_fields", "raw_classification", "point_source_id")
 
@@ -57,6 +61,7 @@ def array_points(array: NDArray[Any], name: str, *, batched: bool = False, cure:
 
 def _rows(array: NDArray[Any], name: str, batched: bool) -> NDArray[Any]:
     shape = array.shape
+    _refuse_poses(array, name)
     if array.ndim == 3 and {shape[0], shape[2]} & {3, 4}:
         check_photo(array, name)
     if array.ndim == 2 and shape[0] in range(3, _MOST_CHANNELS + 1) and shape[1] >= FEWEST:
@@ -84,6 +89,20 @@ def _rows(array: NDArray[Any], name: str, batched: bool) -> NDArray[Any]:
     raise fault(name, f"expected an array of shape (N, 3), got {shape}", _shape_cure(array, batched))
 
 
+def _refuse_poses(array: NDArray[Any], name: str) -> None:
+    # A trajectory has the shape of an organised cloud, and its rotations would be points at 1 m from the origin.
+    if array.ndim != 3 or array.shape[1:] not in _POSES:
+        return
+    R = np.ma.getdata(array)[:, :3, :3].astype(np.float64)
+    with np.errstate(over="ignore", invalid="ignore"):
+        off = np.abs(R @ np.swapaxes(R, 1, 2) - np.eye(3)).max(initial=0.0)
+    if off < _NO_ROTATION:
+        where = "; their positions are x[:, :3, 3]" if array.shape[2] == 4 else ""
+        raise fault(
+            name, f"its shape {array.shape} holds {len(array)} poses, not points", f"give a cloud{where}"
+        )
+
+
 def _without_first(array: NDArray[Any]) -> str:
     channels = array.shape[0] in range(3, _MOST_CHANNELS + 1) and array.shape[-1] > _MOST_CHANNELS
     return "x[1:4]" if channels else "x[..., 1:4]"
@@ -99,12 +118,23 @@ def _shape_cure(array: NDArray[Any], batched: bool) -> str:
     return "give one row a point: numpy.column_stack([x, y, z])"
 
 
-def _of_fields(array: NDArray[Any], name: str) -> Array:
-    names = array.dtype.names or ()
-    raw = [each for each in _LAS_ONLY if each in names]
+def refuse_raw_las(names: Sequence[str], name: str) -> None:
+    """Refuse the fields of LAS as they are stored, as laspy's `points.array` and lazpy's `arrays()` hold them.
+
+    Raises
+    ------
+    ValueError
+        One of the names is a field of LAS, and the coordinates are called X, Y and Z.
+    """
+    raw = [each for each in names if each.lower() in _LAS_ONLY]
     if raw and "X" in names:
         problem = f"is a raw LAS record (it has {raw[0]!r}), its X, Y and Z are not scaled"
         raise fault(name, problem, "give what laspy.read returns, or its xyz")
+
+
+def _of_fields(array: NDArray[Any], name: str) -> Array:
+    names = array.dtype.names or ()
+    refuse_raw_las(names, name)
     lowered = [each.lower() for each in names]
     together = next((lowered.index(each) for each in TOGETHER if each in lowered), None)
     if together is not None and "x" not in lowered:

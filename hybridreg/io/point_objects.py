@@ -33,6 +33,7 @@ _VERTICES = {
     "transformed_vertex_matrix": "x.transformed_vertex_matrix()",
 }
 _DEEPEST = 3
+_TRIANGLE = 3  # corners
 _CURE = "pass an array of shape (N, 3), such as numpy.column_stack([x, y, z])"
 
 
@@ -155,6 +156,8 @@ def _held(x: Any) -> Any:
         held = held() if callable(held) else held  # small_gicp's points are a method
         if held is not None:
             return held
+    if hasattr(getattr(x, "points3D", None), "values"):  # pycolmap's reconstructions
+        return np.array([each.xyz for each in x.points3D.values()])
     if hasattr(x, "elements") and hasattr(x, "obj_info"):  # plyfile
         return x["vertex"].data
     data = getattr(x, "data", None)
@@ -216,10 +219,17 @@ def _has_faces(x: Any) -> bool:
         faces = getattr(x, "faces", None)
         return faces is None or callable(faces) or len(faces) > 0
     cells, mesh = getattr(x, "cells", None), getattr(x, "mesh", None)
-    if isinstance(cells, (list, tuple)):  # meshio, whose points may be cells too
-        return any(getattr(cell, "type", "vertex") != "vertex" and len(cell.data) for cell in cells)
+    if isinstance(cells, (list, tuple)):
+        return any(map(_is_faces, cells))
     # pyntcloud, whose faces are a table beside the points
     return mesh is not None and tables.labels(mesh) is not None and len(mesh) > 0
+
+
+def _is_faces(cells: Any) -> bool:
+    # meshio's cells of one kind, which may be points too; vedo's are rows of corners
+    if hasattr(cells, "type"):
+        return bool(cells.type != "vertex" and len(cells.data))
+    return len(cells) >= _TRIANGLE
 
 
 def _as_array(x: Any, name: str) -> NDArray[Any]:

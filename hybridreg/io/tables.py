@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hybridreg.io.arrays import array_points
+from hybridreg.io.arrays import array_points, refuse_raw_las
 from hybridreg.io.column_names import axes_in, find_axes
 from hybridreg.io.coordinate_systems.length_unit import in_metres
 from hybridreg.io.faults import fault, shorten
@@ -48,7 +48,8 @@ def points(x: Any, names: list[Any], name: str) -> Array:
     Raises
     ------
     ValueError
-        No columns, or several, that could be x, y and z; columns of unequal length, or without numbers.
+        No columns, or several, that could be x, y and z; columns of unequal length, or without numbers; or as
+        `refuse_raw_las`.
     """
     told = [str(each[-1]) if isinstance(each, tuple) else str(each) for each in names]
     unnamed = len(names) >= 3 and all(_UNNAMED.fullmatch(each) for each in told)
@@ -63,6 +64,8 @@ def points(x: Any, names: list[Any], name: str) -> Array:
     if len({len(column) for column in columns}) > 1:
         lengths = ", ".join(str(len(column)) for column in columns)
         raise fault(name, f"x, y and z have the lengths {lengths}", "give them equally long")
+    if all(np.array_equal(column, np.round(column)) for column in columns):
+        refuse_raw_las(told, name)
     metres = axes.metres if axes.metres != 1.0 else _unit(x, axes.columns, names, name)
     return in_metres(stack_axes(*columns), metres, name)
 

@@ -180,3 +180,15 @@ def test_real_sweep(real_data, tmp_path):
         for count in (len(xyz), keep):
             (tmp_path / name).write_bytes(table[:count].tobytes())
             np.testing.assert_array_equal(read_points(tmp_path / name), xyz[:count])
+
+
+@pytest.mark.parametrize("shape", [(1500, 2000, 1), (1333, 1999, 1), (1500, 2000, 3), (480, 640, 1)])
+def test_maps_of_colmap_are_no_clouds(shape):
+    # By hand, as its documentation has them (Output Format). The size of many pictures is a whole number of points, and
+    # their depths were read as x, y and z.
+    high, wide, channels = shape
+    across, down = np.meshgrid(np.linspace(0, 9, wide), np.linspace(0, 7, high))
+    depths = np.broadcast_to(6.0 + 3.0 * np.sin(across) + np.cos(down), (channels, high, wide)).astype("<f4")
+    data = f"{wide}&{high}&{channels}&".encode() + depths.tobytes()
+    with pytest.raises(ValueError, match=rf"COLMAP \({wide} x {high}\), not a cloud; .*fused\.ply"):
+        parse_bin(data, "a.jpg.geometric.bin")

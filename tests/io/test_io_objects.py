@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from hybridreg import PointCloud
 
@@ -105,6 +106,20 @@ def test_several_clouds_are_not_one() -> None:
     assert "x[0]" in refused(torch.tensor(np.stack([P] * 16)))
     assert "x[0]" in refused(torch.tensor(P.T)[None])
     same(torch.tensor(P)[None])
+
+
+@pytest.mark.parametrize("shape", [(4, 4), (3, 4), (3, 3)])
+def test_a_trajectory_is_no_organised_cloud(shape: tuple[int, int]) -> None:
+    # Rotations were read as points at 1 m from the origin.
+    T = np.tile(np.eye(4), (100, 1, 1))
+    T[:, :3, :3] = Rotation.from_rotvec(np.linspace(0.0, 3.0, 100)[:, None] * [0.0, 0.0, 1.0]).as_matrix()
+    T[:, :3, 3] = np.linspace(0.0, 50.0, 300).reshape(100, 3)
+    poses = T[:, : shape[0], : shape[1]]
+    for given in (poses, list(poses), poses.astype(np.float32)):
+        assert "holds 100 poses, not points" in refused(given)
+    assert ("x[:, :3, 3]" in refused(poses)) == (shape[1] == 4)
+    scan = np.concatenate([P.reshape(20, 3, 3), np.ones((20, 3, 1))], axis=2)[:, : shape[0], : shape[1]]
+    assert len(PointCloud.of(scan)) == 60  # an organised cloud of three columns
 
 
 def test_a_column_that_counts_is_no_coordinate() -> None:
@@ -427,6 +442,14 @@ def test_laspy() -> None:
     same(las, grid)
     same(las.points, grid)
     assert "laspy.read" in refused(las.points.array)
+    # The same as a table, as many make it, or as lazpy 0.9.2's `arrays()`: thousandths were read as metres.
+    columns = {each: las.points.array[each] for each in las.points.array.dtype.names}
+    assert "laspy.read" in refused(columns)
+    assert "laspy.read" in refused(
+        {**{axis: columns[axis] for axis in "XYZ"}, "point_source_ID": np.zeros(60)}
+    )
+    assert "laspy.read" in refused(pytest.importorskip("pandas").DataFrame(columns))
+    same({**columns, **dict(zip("XYZ", grid.T, strict=True))}, grid)  # scaled beforehand
 
 
 def test_trimesh() -> None:
@@ -477,6 +500,9 @@ def test_meshes_of_meshio_pyntcloud_and_pymeshlab_are_no_clouds() -> None:
         )
 
     same(SimpleNamespace(points=P, cells=[]))
+    same(SimpleNamespace(vertices=P, cells=[[0], [1, 2]]))
+    # vedo 2026.6.3, whose cells are lists of corners: its meshes were read as their vertices
+    assert "x.vertices" in refused(SimpleNamespace(vertices=P, cells=[[0, 1, 2]]))
     same(meshio("vertex", np.arange(len(P))[:, None]))
     same(SimpleNamespace(points=points, mesh=None))
     same(meshlab(0))
@@ -484,6 +510,13 @@ def test_meshes_of_meshio_pyntcloud_and_pymeshlab_are_no_clouds() -> None:
         assert "a mesh is not a cloud; sample its surface, or pass its vertices, x.points" in refused(mesh)
     assert "x.transformed_vertex_matrix()" in refused(meshlab(1))
     assert "x.current_mesh()" in refused(SimpleNamespace(current_mesh=lambda: meshlab(0)))
+
+
+def test_reconstructions_of_pycolmap() -> None:
+    # As pycolmap 4.2.1 keeps them; they were refused with a cure that led nowhere, "pass what its read() returns".
+    points = {7 * k: SimpleNamespace(xyz=p, color=np.zeros(3, np.uint8)) for k, p in enumerate(P)}
+    same(SimpleNamespace(points3D=points, read=lambda path: None))
+    assert "empty" in refused(SimpleNamespace(points3D={}, read=lambda path: None))
 
 
 def test_epochs_of_py4dgeo() -> None:

@@ -320,3 +320,11 @@ def test_a_range_first_is_refused_and_a_ring_first_is_told():
         parse_text(rows.encode(), "a.csv")
     named = parse_text(f"id;x;y;z;kind\n{rows}".encode(), "a.csv")
     np.testing.assert_array_equal(named, points)
+
+
+def test_a_raw_las_record_saved_as_text_is_refused() -> None:
+    # As pandas writes a table of laspy's `points.array`: whole numbers, not scaled yet.
+    rows = "X,Y,Z,intensity,point_source_id\n" + "".join(f"{k},{2 * k},{k % 7},0,1\n" for k in range(30))
+    with pytest.raises(ValueError, match=r"raw LAS record .*laspy\.read"):
+        parse_text(rows.encode(), "a.csv")
+    assert len(parse_text(rows.replace("\n3,", "\n3.25,").encode(), "a.csv")) == 30

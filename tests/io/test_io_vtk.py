@@ -222,3 +222,15 @@ def test_other_meshes_that_are_none(tmp_path: Path, content: str, word: str) -> 
     (tmp_path / "a.obj").write_text(content)
     with pytest.raises(ValueError, match=word):
         read_points(tmp_path / "a.obj")
+
+
+@pytest.mark.usefixtures("vtk")
+def test_points_that_no_face_holds_are_not_left_out_in_silence(tmp_path: Path) -> None:
+    few = np.concatenate([np.eye(3), HUNDRED[:2]])
+    assert (
+        len(read_points(written(tmp_path / "a.vtp", [few], faces=[[0, 1, 2]]))) > 100
+    )  # two of five are no scan
+    with pytest.raises(
+        ValueError, match="surfaces and 97 points that belong to none; export only the points"
+    ):
+        read_points(written(tmp_path / "b.vtp", [HUNDRED], faces=[[0, 1, 2]]))

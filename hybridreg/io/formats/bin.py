@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -12,6 +14,8 @@ from hybridreg.io.record_fields import stack_axes
 from hybridreg.io.signatures import looks_like_text
 
 _WIDTHS = (3, 4, 5, 6)
+# COLMAP's maps of depths and normals begin so (its documentation, Output Format): width, height and channels.
+_MAP = re.compile(rb"(\d{1,6})&(\d{1,6})&\d{1,3}&")
 _KITTI = 4  # numbers a row
 _NUSCENES = 5
 _FARTHEST = 1e7  # metres: beyond any map grid, while bytes that are not coordinates go up to 1e38
@@ -42,8 +46,13 @@ def parse_bin(data: bytes, name: str) -> NDArray[np.float64]:
     Raises
     ------
     ValueError
-        Text; a size or values that fit no width, or several.
+        Text; a map of COLMAP; a size or values that fit no width, or several.
     """
+    shape = _MAP.match(data)
+    if shape is not None:
+        wide, high = (int(each) for each in shape.groups())
+        problem = f"is a map of depths or normals of COLMAP ({wide} x {high}), not a cloud"
+        raise fault(name, problem, "give the cloud that COLMAP fuses of its maps, fused.ply")
     if looks_like_text(data):
         raise fault(name, "is text, not float32 rows", "rename it to end in .txt")
     possible = [width for width in _WIDTHS if len(data) % (4 * width) == 0]

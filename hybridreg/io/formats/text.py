@@ -8,6 +8,7 @@ import re
 import numpy as np
 from numpy.typing import NDArray
 
+from hybridreg.io.arrays import refuse_raw_las
 from hybridreg.io.column_names import Axes
 from hybridreg.io.coordinate_systems.length_unit import in_metres
 from hybridreg.io.faults import fault
@@ -36,7 +37,8 @@ def parse_text(data: bytes, name: str) -> NDArray[np.float64]:
     Raises
     ------
     ValueError
-        No text, no rows, a row without numbers, a wrong count, or a first column of row numbers.
+        No text, no rows, a row without numbers, a wrong count, or a first column of row numbers; or as
+        `refuse_raw_las`.
     """
     if looks_binary(data):
         raise fault(name, "is not plain text: it holds zero bytes", "save it as UTF-8 text")
@@ -64,6 +66,8 @@ def parse_text(data: bytes, name: str) -> NDArray[np.float64]:
     axes = named or _POSITION
     rows = [row.replace(",", ".") for row in rows] if comma else rows
     points = parse_rows(rows, axes.columns, name, delimiter)
+    if names and np.array_equal(points, np.round(points)):
+        refuse_raw_las(names, name)
     if named is None:
         _check_first(points, rows, delimiter, name)
     if axes.metres != 1.0:

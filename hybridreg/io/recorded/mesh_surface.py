@@ -3,12 +3,14 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hybridreg.io.faults import fault, foreign_parser
+from hybridreg.io.recorded.gltf_positions import check_positions
 from hybridreg.io.recorded.recording import Recorded, Selection
 from hybridreg.runtime.optional_packages import load
 
@@ -16,6 +18,7 @@ Array = NDArray[np.float64]
 
 # Points of a mesh: some hundreds on each of the cells that a default voxel leaves of it.
 _SAMPLES = 200_000
+_VERTEX = re.compile(rb"^v[ \t]", re.MULTILINE)
 NO_PLACE = np.zeros((0, 3))
 
 
@@ -29,24 +32,58 @@ def read_mesh(path: Path, selection: Selection) -> Recorded:
     Raises
     ------
     ValueError
-        Damaged, empty, or with faces that are not finite or have no area.
+        Damaged, empty, with faces that are not finite or have no area, or as `check_positions` and
+        `refuse_loose`.
     ImportError
         Without trimesh.
     """
     name = str(path)
     trimesh = load("trimesh", f"{name}: a mesh")
+    if path.suffix.lower() in (".glb", ".gltf"):
+        check_positions(path, name)
     with foreign_parser(name, "a mesh"):
         loaded = trimesh.load(name, process=False)
         parts = loaded.dump() if isinstance(loaded, trimesh.Scene) else [loaded]
         meshes = [part for part in parts if len(getattr(part, "faces", ()))]
+        clouds = [len(part.vertices) for part in parts if isinstance(part, trimesh.PointCloud)]
+        used = [corners(np.asarray(mesh.faces), len(mesh.vertices)) for mesh in meshes]
+        held = [len(mesh.vertices) for mesh in meshes]
         if meshes:
             triangles = np.vstack([np.asarray(mesh.triangles, dtype=np.float64) for mesh in meshes])
         points = [np.asarray(part.vertices, dtype=np.float64) for part in parts if len(part.vertices)]
     if meshes:
+        every = max(sum(held), _vertices_of_obj(path))
+        refuse_loose(sum(clouds) or every - sum(used), 0 if clouds else every, name)
         return Recorded(spread_over(triangles, name), NO_PLACE)
     if not points:
         raise fault(name, "holds neither faces nor points", "export it with its geometry")
     return Recorded(np.vstack(points))
+
+
+def refuse_loose(loose: int, every: int, name: str) -> None:
+    """Refuse `loose` points that belong to no face, where they are more than half of `every` one: a scan that is saved
+    with a marker or a model beside it would be left out.
+
+    Raises
+    ------
+    ValueError
+        There are so many.
+    """
+    if 2 * loose > every:
+        problem = f"holds surfaces and {loose} points that belong to none"
+        raise fault(name, problem, "export only the points, or only the surfaces")
+
+
+def corners(faces: NDArray[np.int64], count: int) -> int:
+    """How many of `count` vertices are corners of faces."""
+    used = np.zeros(count, dtype=bool)
+    used[np.ravel(faces)] = True
+    return int(used.sum())
+
+
+def _vertices_of_obj(path: Path) -> int:
+    # Those of no face are left out by trimesh.
+    return len(_VERTEX.findall(path.read_bytes())) if path.suffix.lower() == ".obj" else 0
 
 
 def spread_over(triangles: Array, name: str) -> Array:

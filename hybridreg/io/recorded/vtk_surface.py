@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybridreg.io.faults import fault, foreign_parser, shorten
-from hybridreg.io.recorded.mesh_surface import NO_PLACE, spread_over
+from hybridreg.io.recorded.mesh_surface import NO_PLACE, corners, refuse_loose, spread_over
 from hybridreg.io.recorded.recording import Recorded, Selection
 from hybridreg.runtime.optional_packages import load
 
@@ -23,7 +23,8 @@ def read_vtp(path: Path, selection: Selection) -> Recorded:
     """Read a `.vtp` file, all its pieces, in its own frame and unit, in whatever way its numbers are stored.
 
     Polygons and strips of triangles are a surface, which becomes points as any mesh's does (`read_mesh`); points that
-    belong to none of them are left out then. A file without faces gives all its points, those that no cell uses too.
+    belong to none of them are left out then, or refused where they are the most (`refuse_loose`). A file without faces
+    gives all its points, those that no cell uses too.
 
     Raises
     ------
@@ -42,6 +43,7 @@ def read_vtp(path: Path, selection: Selection) -> Recorded:
     triangles = _triangles(data, points, convert, name)
     if not len(triangles):
         return Recorded(points)
+    refuse_loose(len(points) - corners(triangles, len(points)), len(points), name)
     return Recorded(spread_over(points[triangles], name), NO_PLACE)
 
 
