@@ -10,6 +10,7 @@ from hybridreg.geometry.extent import reach, some
 from hybridreg.geometry.voxel_cells import voxel_cells, voxel_centroids
 from hybridreg.pair import Pair
 from hybridreg.resolution import comparable, default_voxel
+from hybridreg.runtime.side_by_side import side_by_side
 
 _MANY = 900_000  # points above which a cloud is thinned; by hand
 # Cells kept along the edge of a voxel: surfaces are fitted, and free space is tested, at no less than half a voxel.
@@ -29,7 +30,7 @@ def thinned(pair: Pair, voxel: float | None) -> Pair:
         Metres, of the grid that follows; None as `default_voxel`. Cells are a quarter as wide, or up to as wide where
         the points fill a volume, which no surface does.
     """
-    source, target = (_thinned(cloud, pair, voxel) for cloud in (pair.source, pair.target))
+    source, target = side_by_side(lambda cloud: _thinned(cloud, pair, voxel), pair.source, pair.target)
     if source is pair.source and target is pair.target:
         return pair
     return pair.with_clouds(source, target)

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybridreg.evidence.agreement import Agreement
+from hybridreg.evidence.things import GROUND, things
 from hybridreg.evidence.views import View, Views
 
 Array = NDArray[np.float64]
@@ -25,7 +26,6 @@ _LONG, _WIDE, _TALL = 25.0, 3.2, 4.5
 _SHORT, _LOW = 0.8, 2.0
 _OFF_GROUND = 0.3  # metres over the ground from which points belong to a thing; by hand
 _CELL = 0.4  # metres between two things that are told apart; by hand
-_MOST_CELLS = 2_000  # along an axis, for memory
 _LEVEL = 0.6  # sine of the angle between an upright surface's normal and the level, at most; by hand
 _FACING = 0.5  # cosine of the angle between a normal and the direction that it holds, at least; by hand
 # What fixed things hold of the pose along some direction, beside what vehicles hold: of 24 made poses that follow
@@ -41,7 +41,8 @@ _SPREAD = 12.0
 # made relief that repeats every nine metres had 77 and 132 at wrong ones.
 _TELLS = 100.0
 
-_GROUND, _FIXED = -1, 0
+# A point of what cannot drive off, in the place of a thing's number.
+_FIXED = -1
 
 
 def held_along(views: Views, agreement: Agreement) -> Array | None:
@@ -63,7 +64,7 @@ def held_along(views: Views, agreement: Agreement) -> Array | None:
         ),
     ):
         thing = views.scene.shared(("things", after > 0), partial(_things, view))[view.asked]
-        holds = way.looked & way.agrees & (thing != _GROUND) & (np.abs(facing @ up) < _LEVEL)
+        holds = way.looked & way.agrees & (thing != GROUND) & (np.abs(facing @ up) < _LEVEL)
         rows.append((points[holds], facing[holds], np.where(thing > 0, thing + after, _FIXED)[holds]))
     points, facing, thing = (np.concatenate(parts) for parts in zip(*rows, strict=True))
     still = thing == _FIXED
@@ -82,23 +83,15 @@ def held_along(views: Views, agreement: Agreement) -> Array | None:
 
 def _things(view: View) -> Rows:
     # Of each point: a number from 1 for the thing that may drive off which it is part of, or one of the two above.
-    from scipy import ndimage
-
     assert view.ground is not None  # asked before
     height, places = view.ground.above(view.points), view.points @ view.ground.levelling[:2].T
-    thing = np.where(height > _OFF_GROUND, _FIXED, _GROUND)
-    rows = np.flatnonzero(thing == _FIXED)
+    thing = things(places, height, _OFF_GROUND, _CELL)
+    rows = np.flatnonzero(thing != GROUND)
+    rows = rows[np.argsort(thing[rows], kind="stable")]
     if len(rows) == 0:
         return thing
-    offsets = places[rows] - places[rows].min(axis=0)
-    cells = (offsets / max(_CELL, float(offsets.max()) / _MOST_CELLS)).astype(np.int64)
-    grid = np.zeros(cells.max(axis=0) + 1, dtype=bool)
-    grid[tuple(cells.T)] = True
-    labels, n = ndimage.label(grid, np.ones((3, 3)))
-    label = labels[tuple(cells.T)]
-    order = np.argsort(label, kind="stable")
-    starts = np.searchsorted(label[order], np.arange(1, n + 1))
-    drives = _may_drive(places[rows][order], height[rows][order], starts)
+    label = thing[rows]
+    drives = _may_drive(places[rows], height[rows], np.searchsorted(label, np.arange(1, label[-1] + 1)))
     thing[rows] = np.where(drives[label - 1], label, _FIXED)
     return thing
 

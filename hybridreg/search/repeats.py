@@ -8,6 +8,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from hybridreg.evidence.things import things
 from hybridreg.evidence.views import Views
 from hybridreg.geometry import se3
 from hybridreg.search.moved_points import CHANCE, MovedPoints, peaks
@@ -32,13 +33,20 @@ _SHARE, _OF_ALL = 0.25, 0.4
 _MOST = 4
 # Cells, or turns, between two of them, at least; by hand.
 _APART = 2
+# The same of turns about a thing: when its near side has turned away, little of it is left; by hand.
+_OF_ROUND = 0.2
+# Cells over the ground from which a point belongs to a thing, cells between two, and how many are turned; by hand.
+_OFF_GROUND, _GAP, _THINGS = 1.5, 2.0, 2
+# Share of what stands on the ground that such a thing holds, at least: among many others a turn about one says nothing.
+_MOST_OF_IT = 0.5
 # Fewest points that coincide at the pose itself, for a turn to be looked for; by hand.
 _AT_POSE = 10.0
 
 
 def copies(views: Views, T_target_source: Array, axes: Array) -> list[Array]:
     """Poses (4, 4) beside a pose, at which nearly as many points coincide: shifted along the commonest surface or away
-    from it, or turned about a place where either cloud was seen from, or the origin of its frame.
+    from it, or turned about a place where either cloud was seen from, the origin of its frame, or a thing that may be
+    round.
 
     Points that face the commonest axis `axes[0]` coincide anywhere along it (on a street, those of its ground), and
     count only where the shift leads away from it. Of the others the same share must coincide for each axis: along a
@@ -57,6 +65,7 @@ class _Place(MovedPoints):
         own = se3.apply(T, np.array([views.source.centre, origin]))
         self.centres = _apart([*own, views.target.centre, origin], 2.0 * self.cell)
         self.up = axes[0] if views.up is None else views.up
+        self.round = _round(self.others, self.other_axis == 0, self.up, self.cell)
 
     def shifted(self) -> Iterator[Array]:
         middle = self.things[self.axis > 0].mean(axis=0)
@@ -76,19 +85,45 @@ class _Place(MovedPoints):
             yield se3.from_rt(np.eye(3), self.cell * (j - _ALONG) * self.axes[0])
 
     def turned(self) -> Iterator[Array]:
+        others = OccupiedCells(self.others[self.other_axis > 0], self.cell)
+        things = self.things[self.axis > 0]
+        for centre in self.centres:
+            yield from self._about(centre, things[: _POINTS // 3], others, _OF_ALL)
+        for centre, radius in self.round:
+            arms = things - centre
+            within = np.linalg.norm(arms - np.outer(arms @ self.up, self.up), axis=1) < radius
+            if np.mean(within) > _MOST_OF_IT:
+                yield from self._about(centre, things[within], others, _OF_ROUND)
+
+    def _about(self, centre: Array, things: Array, others: OccupiedCells, least: float) -> Iterator[Array]:
         degrees = np.concatenate([[0.0], np.arange(_FIRST_DEG, 360.0 - _FIRST_DEG, _ROUND_DEG)])
         turns = se3.rotation_about(np.radians(degrees)[:, None] * self.up)
-        things = self.things[self.axis > 0][: _POINTS // 3]
-        others = OccupiedCells(self.others[self.other_axis > 0], self.cell)
-        for centre in self.centres:
-            moved = (things - centre) @ np.swapaxes(turns, 1, 2) + centre
-            met = CHANCE + others.hold(moved).sum(axis=1)
-            if met[0] < CHANCE + _AT_POSE:  # nothing coincides at the pose itself
-                continue
-            share = np.where(met >= _OF_ALL * met[0], met / met[0], 0.0)
-            share[0] = 0.0
-            for _, k in _peaks(share[None], centre=False):
-                yield se3.about(centre, turns[k], np.zeros(3))
+        moved = (things - centre) @ np.swapaxes(turns, 1, 2) + centre
+        met = CHANCE + others.hold(moved).sum(axis=1)
+        if met[0] < CHANCE + _AT_POSE:  # nothing coincides at the pose itself
+            return
+        share = np.where(met >= least * met[0], met / met[0], 0.0)
+        share[0] = 0.0
+        for _, k in _peaks(share[None], centre=False):
+            yield se3.about(centre, turns[k], np.zeros(3))
+
+
+def _round(points: Array, ground: NDArray[np.bool_], up: Array, cell: float) -> list[tuple[Array, float]]:
+    # Centre and radius of what may be round, like a gear or a wheel: the largest things off the ground, or the table.
+    import cv2
+
+    level = np.cross(up, np.eye(3)[np.argmin(np.abs(up))])
+    frame = np.array([level / np.linalg.norm(level), np.cross(up, level / np.linalg.norm(level)), up])
+    places = points @ frame.T
+    heights = np.abs(places[:, 2] - np.median(places[ground, 2]))
+    thing = things(places[:, :2], heights, _OFF_GROUND * cell, _GAP * cell)
+    found = []
+    for label in (np.argsort(-np.bincount(thing)[1:]) + 1)[:_THINGS]:
+        own = places[thing == label]
+        (x, y), radius = cv2.minEnclosingCircle((own[:, :2] - own[0, :2]).astype(np.float32))
+        middle = np.array([own[0, 0] + x, own[0, 1] + y, own[:, 2].mean()])
+        found.append((middle @ frame, float(radius) + cell))
+    return found
 
 
 def _apart(places: Sequence[Array], least: float) -> list[Array]:

@@ -3,11 +3,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
 from hybridreg.evidence.pose_evidence import PoseEvidence
 from hybridreg.evidence.surface_distance import settle_closely
+from hybridreg.evidence.views import Views
 from hybridreg.matches import Pose
 from hybridreg.resolution import tolerance
 from hybridreg.scene import Scene
@@ -22,8 +25,8 @@ Array = NDArray[np.float64]
 
 # Rivals that the estimator offers, the best first; by hand.
 _OFFERED = 4
-# Most promising guesses that are settled; by hand.
-_SETTLED = 8
+# Most promising guesses about a pose that are settled; by hand.
+_SETTLED = 4
 # Turned poses at which most surfaces meet, settled whatever they promise: half a cell off, a room promises nothing.
 _FULLEST = 4
 # Rivals that are enough; by hand.
@@ -46,14 +49,9 @@ def find(scene: Scene, own: Hypothesis, pose: Pose) -> list[Hypothesis]:
         return differs(T, own.T, centre, views.spacing)
 
     known, guesses = parted(as_hypotheses(pose)[1 : 1 + _OFFERED])
-    turned = _turned(own.at)
-    guesses += [*turned[_FULLEST:], *copies(views, own.T, own.at.agreement.axes)]
-    promising = [*known, *seen_at(scene, [T for T in guesses if is_rival(T)], _QUICK)]
-    likeliest = best(with_matches(scene, one) for one in promising if is_rival(one.T))[:_SETTLED]
-    guessed = [one.T for one in likeliest if not one.settled]
-    guessed += [T for T in turned[:_FULLEST] if is_rival(T)]
-    moved = seen_at(scene, settle.settle(views, np.array(guessed).reshape(-1, 4, 4)), _CLOSE)
-    rivals = [*(one for one in likeliest if one.settled), *moved]
+    # A pose that is weighed again, beside what another entry found, lies among the same surfaces.
+    around = scene.shared(("around", own.T.tobytes()), lambda: _around(own.at, is_rival))
+    rivals = [*known, *_settled(views, [T for T in guesses if is_rival(T)]), *around]
     # Guesses that come back to the pose are no rivals, and two that meet are one; neither must hide those behind them.
     apart = distinct(scene, (with_matches(scene, one) for one in rivals if is_rival(one.T)))[:_ENOUGH]
 
@@ -64,12 +62,27 @@ def find(scene: Scene, own: Hypothesis, pose: Pose) -> list[Hypothesis]:
     return distinct(scene, [*(one for one in apart if came_to_rest(one)), *_beside(scene, own)])
 
 
+def _around(own: PoseEvidence, is_rival: Callable[[Array], bool]) -> list[Hypothesis]:
+    # What looks alike after a turn or a shift, settled.
+    views, turned = own.views, _turned(own)
+    guesses = [*turned[_FULLEST:], *copies(views, own.T, own.agreement.axes)]
+    likeliest = best(seen_at(views.scene, [T for T in guesses if is_rival(T)], _QUICK))[:_SETTLED]
+    return _settled(views, [*(one.T for one in likeliest), *filter(is_rival, turned[:_FULLEST])])
+
+
+def _settled(views: Views, guesses: Sequence[Array]) -> list[Hypothesis]:
+    return seen_at(views.scene, settle.settle(views, np.array(guesses).reshape(-1, 4, 4)), _CLOSE)
+
+
 def _beside(scene: Scene, own: Hypothesis) -> list[Hypothesis]:
     # The likeliest copy of the place just beside the pose, if any contends.
     if own.log_odds < -_CONTENDS:
         return []
     views, allowed = own.at.views, tolerance(scene.pair.source, scene.pair.target)
-    beside = seen_at(scene, near_copies(views, own.T, own.at.agreement.axes, allowed), _CLOSE)
+    beside = scene.shared(
+        ("beside", own.T.tobytes()),
+        lambda: seen_at(scene, near_copies(views, own.T, own.at.agreement.axes, allowed), _CLOSE),
+    )
     likeliest = best(with_matches(scene, one) for one in beside)[:1]
     return [
         one

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from hybridreg.evidence import lone_thing
+from hybridreg.evidence import corner, lone_thing
 from hybridreg.evidence.covariance import of_information
 from hybridreg.evidence.evidence import Evidence
 from hybridreg.evidence.log_odds import FAILED
@@ -48,6 +48,8 @@ class Doubts:
         A rival is likely by itself where little tells which of two is right.
     lone_thing : bool
         One thing is seen from one side, and nothing known beforehand excludes the opposite side.
+    corner : bool
+        Nothing agrees but the planes of one corner of a room, and nothing known beforehand excludes another.
     stretch : Stretch or None
         How the source fits better.
     range_offset : RangeOffset or None
@@ -60,6 +62,7 @@ class Doubts:
     through_walls: bool
     alike: bool
     lone_thing: bool = False
+    corner: bool = False
     stretch: Stretch | None = None
     range_offset: RangeOffset | None = None
     traffic: Array | None = None
@@ -71,7 +74,7 @@ class Doubts:
     def about_pose(self) -> bool:
         """Whether another pose may be right."""
         found = self.slack is not None or self.traffic is not None
-        return self.through_walls or self.alike or self.lone_thing or found
+        return self.through_walls or self.alike or self.lone_thing or self.corner or found
 
     @property
     def about_source(self) -> bool:
@@ -96,6 +99,7 @@ class Doubts:
         return replace(
             quick,
             lone_thing=opposite is not None and scene.pair.allows(opposite),
+            corner=corner.bare_corner(at) and corner.others_allowed(scene.pair, at),
             stretch=at.stretch,
             range_offset=offset if offset is not None and offset.told and not strained else None,
             traffic=None if scene.pair.drawn else at.traffic,

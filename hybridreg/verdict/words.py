@@ -62,6 +62,7 @@ def reasons(
         *_with_traffic(doubts.traffic),
         *_against(evidence, agreement, held, doubts.through_walls),
         *_from_one_side(doubts.lone_thing),
+        *_in_a_corner(doubts.corner),
         *_inexact(doubts.slack),
         *_unknown(unseen),
     )
@@ -164,6 +165,15 @@ def _from_one_side(lone_thing: bool) -> Iterator[str]:
             "one thing stands alone on flat ground, and by this pose both sensors look at the same side of it; from "
             "behind it may look alike. A rough start excludes that: init=T, max_rotation=90 (--init POSE "
             "--max-rotation 90)"
+        )
+
+
+def _in_a_corner(corner: bool) -> Iterator[str]:
+    if corner:
+        yield (
+            "nothing agrees but the walls and the floor of one corner, and other corners look alike; what stands in "
+            "it, or both ends of a wall, would tell. A rough start excludes the others: init=T, max_rotation=45 "
+            "(--init POSE --max-rotation 45)"
         )
 
 

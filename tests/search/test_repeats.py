@@ -8,6 +8,8 @@ import tracemalloc
 import numpy as np
 import pytest
 
+from hybridreg.classical.voxel import VoxelGrid
+from hybridreg.data.hard import box_world
 from hybridreg.evidence import views
 from hybridreg.evidence.agreement import compare
 from hybridreg.geometry import se3
@@ -125,3 +127,30 @@ def test_a_pose_that_lays_the_clouds_apart_has_no_copies() -> None:
     far[0, 3] = 5000.0
     assert copies(both, far, compare(both, far).axes) == []
     assert near_copies(both, far, compare(both, far).axes, VEHICLES) == []
+
+
+@pytest.mark.parametrize("teeth", [6, 8, 12])
+def test_turns_about_a_round_thing_on_a_table_are_found(teeth: int) -> None:
+    """A wheel with teeth and a block: turned by a tooth it fits, and the block alone tells."""
+    world = box_world.World()
+    for angle in 2.0 * np.pi * np.arange(teeth // 2) / teeth:
+        world.box(0.0, 0.0, (2.7, 0.35, 0.5), angle)
+    world.box(2.0, 1.5, (0.5, 0.7, 0.5), 0.3)
+    rng = np.random.default_rng(3)
+    frames = [aimed(5.0 * np.array([np.cos(at), np.sin(at), 0.75])) for at in (0.4, 1.2)]
+    clouds = [box_world.scan(world, "rosette", frame, rng) for frame in frames]
+    clouds = [cloud[np.linalg.norm(cloud, axis=1) < 8.5] for cloud in clouds]  # the table
+    truth = se3.inverse(frames[1]) @ frames[0]
+    both = views.of(VoxelGrid()(Pair.of(*clouds)))
+    step = se3.inverse(frames[1]) @ se3.yaw(360.0 / teeth) @ frames[1]
+    wrong = step @ truth
+    found = copies(both, wrong, compare(both, wrong).axes)
+    assert any(se3.angle_deg(T[:3, :3] @ truth[:3, :3].T) < 3.0 for T in found)
+
+
+def aimed(at: np.ndarray) -> np.ndarray:
+    """A sensor (4, 4) that looks at the origin."""
+    ahead = -at / np.linalg.norm(at)
+    aside = np.cross([0.0, 0.0, 1.0], ahead)
+    aside /= np.linalg.norm(aside)
+    return se3.from_rt(np.stack([ahead, aside, np.cross(ahead, aside)], axis=1), at)
