@@ -191,7 +191,7 @@ def test_a_region_of_a_map(demo: Any) -> None:
     assert near(both.transformation, wanted)
 
 
-@pytest.mark.parametrize("factor", [1.0, 1.37, 1000.0])
+@pytest.mark.parametrize("factor", [1.0, 1000.0])
 def test_scale_is_estimated(demo: Any, factor: float) -> None:
     source, target, truth = demo
     result = hr.register(source / factor, target, scale=True)

@@ -48,8 +48,8 @@ def off(found: hr.Alignment, truth: np.ndarray) -> float:
     return float(np.linalg.norm(found.poses[:, :3, 3] - truth[:, :3, 3], axis=1).max())
 
 
-def test_a_tour_of_twenty_scans_survives_a_wrong_link() -> None:
-    scans, truth = tour(20)
+def test_a_tour_of_twelve_scans_survives_a_wrong_link() -> None:
+    scans, truth = tour(12, length=30.0)
     wrong = se3.inverse(truth[9]) @ truth[10] @ se3.from_rt(np.eye(3), np.array([4.0, 2.0, 0.0]))
     found = hr.register_all(scans, known={(10, 9): wrong})
     assert found.verdict == "ok", found.summary()
@@ -58,15 +58,15 @@ def test_a_tour_of_twenty_scans_survives_a_wrong_link() -> None:
     assert any("cloud 10 -> cloud 9 (given) contradicts" in reason for reason in found.reasons)
     assert "cloud 10 -> cloud 9" in found.summary()
     told = json.loads(json.dumps(found.to_dict()))
-    np.testing.assert_allclose(told["poses"]["cloud 19"], found.poses[19])
+    np.testing.assert_allclose(told["poses"]["cloud 11"], found.poses[11])
 
 
 def test_shuffled_scans_another_reference_and_workers() -> None:
-    scans, truth = tour(6, length=18.0)
-    order = [3, 0, 5, 1, 4, 2]
+    scans, truth = tour(5, length=15.0)
+    order = [3, 0, 4, 1, 2]
     shuffled = [scans[k] for k in order]
     found = hr.register_all(shuffled, ordered=False, reference=2, names=[f"s{k}" for k in order])
-    wanted = se3.inverse(truth[5]) @ truth[order]
+    wanted = se3.inverse(truth[4]) @ truth[order]
     assert found.placed.all(), found.summary()
     assert off(found, wanted) < 0.1
     np.testing.assert_array_equal(found.poses[2], np.eye(4))

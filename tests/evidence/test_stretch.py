@@ -60,7 +60,7 @@ def test_small_strains_of_heights_are_left_out_and_a_size_is_told_as_one(crossin
     assert not Stretch(1.025, np.eye(3)[0], 0.975).is_size
 
 
-@pytest.mark.parametrize("strain", [STRETCHED, NARROWED, SHEARED], ids=["5", "-6", "shear"])
+@pytest.mark.parametrize("strain", [STRETCHED, SHEARED], ids=["5", "shear"])
 def test_no_pose_of_a_strained_source_is_ok(crossing: Made, strain: Array) -> None:
     pair = crossing.scene.pair
     result = hr.register(pair.source.points @ strain.T, pair.target.points)

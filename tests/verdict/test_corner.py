@@ -47,7 +47,7 @@ def is_right(T: np.ndarray, truth: np.ndarray) -> bool:
     return se3.angle_deg(off[:3, :3]) < 2.0 and np.linalg.norm(off[:3, 3]) < 0.15
 
 
-@pytest.mark.parametrize("apart_deg", [52.0, 75.0, 90.0, 97.0, 180.0])
+@pytest.mark.parametrize("apart_deg", [52.0, 90.0, 97.0])
 def test_one_corner_laid_on_another_is_not_ok(apart_deg: float) -> None:
     source, target, truth = looks(apart_deg)
     result = hr.register(source, target)

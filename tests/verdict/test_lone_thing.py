@@ -36,8 +36,7 @@ def scanned(world: box_world.World, around_deg: float) -> Made:
     return make(world, "rings64", "rings64", source, target)
 
 
-@pytest.mark.parametrize("posts", [0, 4])
-@pytest.mark.parametrize("around_deg", [165.0, 180.0])
+@pytest.mark.parametrize(("posts", "around_deg"), [(0, 165.0), (4, 180.0)])
 def test_its_back_laid_on_its_front_is_not_ok(posts: int, around_deg: float) -> None:
     made = scanned(house(posts), around_deg)
     pair = made.scene.pair

@@ -86,7 +86,7 @@ def _gaps(scene: Scene, T: np.ndarray) -> np.ndarray:
     return target.tree.query(se3.apply(T, source.points), distance_upper_bound=0.5)[0]
 
 
-@pytest.mark.parametrize("factors", [0.9, 0.94, np.array([1.0, 0.93, 1.0])])
+@pytest.mark.parametrize("factors", [0.94, np.array([1.0, 0.93, 1.0])])
 def test_a_source_of_another_size_is_not_ok_though_the_relief_of_the_ground_fits(
     real_data: Path, factors: float | np.ndarray
 ) -> None:
@@ -104,11 +104,9 @@ def test_a_source_of_another_size_is_not_ok_though_the_relief_of_the_ground_fits
     [
         (0.0, (20.0, 0.0, 0.0)),
         (0.0, (0.0, 0.0, 3.0)),
-        (30.0, (0.0, 0.0, 0.0)),
         # Nearer than two answers to the search: a map that was built badly.
         (0.0, (1.0, 1.0, 0.0)),
         (3.0, (0.0, 0.0, 0.0)),
-        (0.0, (0.0, 0.0, 0.8)),
     ],
 )
 def test_a_map_that_holds_the_place_twice_shows_both(
@@ -148,7 +146,7 @@ def test_a_range_offset_between_sensors_is_not_taken_for_another_size(real_data:
 
 @pytest.mark.parametrize(
     ("name", "factor"),
-    [("kitti-city-20-to-0", 0.97), ("sustech-970-to-965", 0.985), ("sustech-970-to-965", 1.02)],
+    [("kitti-city-20-to-0", 0.97), ("sustech-970-to-965", 1.02)],
 )
 def test_a_right_pose_of_a_source_of_slightly_another_size_is_doubtful(
     real_data: Path, name: str, factor: float
