@@ -24,6 +24,8 @@ Rows = NDArray[np.int64]
 # is shorter, and tall, is a post or a tree.
 _LONG, _WIDE, _TALL = 25.0, 3.2, 4.5
 _SHORT, _LOW = 0.8, 2.0
+# A cloud in which nothing is taller was cropped by height, and does not show how tall things are: metres; by hand.
+_CROPPED = 2.0
 _OFF_GROUND = 0.3  # metres over the ground from which points belong to a thing; by hand
 _CELL = 0.4  # metres between two things that are told apart; by hand
 _LEVEL = 0.6  # sine of the angle between an upright surface's normal and the level, at most; by hand
@@ -90,6 +92,8 @@ def _things(view: View) -> Rows:
     rows = rows[np.argsort(thing[rows], kind="stable")]
     if len(rows) == 0:
         return thing
+    if height[rows].max() < _CROPPED:
+        return np.where(thing == GROUND, GROUND, _FIXED)
     label = thing[rows]
     drives = _may_drive(places[rows], height[rows], np.searchsorted(label, np.arange(1, label[-1] + 1)))
     thing[rows] = np.where(drives[label - 1], label, _FIXED)

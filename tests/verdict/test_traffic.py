@@ -3,13 +3,20 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 import hybridreg as hr
+from hybridreg.classical.voxel import VoxelGrid
 from hybridreg.data.hard import box_world, sample
 from hybridreg.data.hard.true_poses import is_right
+from hybridreg.data.loaders.folder import load_pair
+from hybridreg.evidence import views
+from hybridreg.evidence.pose_evidence import PoseEvidence
 from hybridreg.geometry import se3
+from hybridreg.pair import Pair
 
 
 def road(ahead: float, *, gantries: bool = False) -> box_world.World:
@@ -65,3 +72,15 @@ def test_no_motorway_is_ok_at_a_wrong_pose(seed: int) -> None:
     made = sample("traffic", seed)
     result = hr.register(made.source, made.target)
     assert is_right(made, result.transformation) or result.verdict != "ok"
+
+
+@pytest.mark.parametrize("name", ["kitti-city-20-to-0", "kitti-odo-5-to-0"])
+def test_a_slice_of_a_street_is_not_taken_for_traffic(real_data: Path, name: str) -> None:
+    # Cropped by height, walls are no taller than cars.
+    made = load_pair(real_data / name)
+    source, target = (
+        cloud.points[(cloud.points[:, 2] > -0.7) & (cloud.points[:, 2] < 0.8)]
+        for cloud in (made.pair.source, made.pair.target)
+    )
+    both = views.of(VoxelGrid()(Pair.of(source, target)))
+    assert PoseEvidence(both, made.T_target_source).traffic is None
