@@ -9,11 +9,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hybridreg.io.column_names import axes_in
+from hybridreg.io.column_names import axes_in, stem_and_unit
 from hybridreg.io.coordinate_systems.length_unit import in_metres
 from hybridreg.io.faults import fault
+from hybridreg.io.meaning.beside_points import with_what_is_beside
 from hybridreg.io.meaning.first_column import FEWEST, check_first_column
 from hybridreg.io.meaning.image_shapes import check_photo, refuse_image
+from hybridreg.io.meaning.unit_words import known_metres
 from hybridreg.io.record_fields import stack_axes
 
 Array = NDArray[np.float64]
@@ -118,6 +120,19 @@ def _shape_cure(array: NDArray[Any], batched: bool) -> str:
     return "give one row a point: numpy.column_stack([x, y, z])"
 
 
+def together_in(names: Sequence[Any]) -> tuple[int, float | None] | None:
+    """Which of the names is that of all three coordinates, such as `xyz` or `points_mm`, and its unit in metres."""
+    parsed = [stem_and_unit(str(each)) for each in names]
+    if "x" in [stem for stem, _ in parsed]:
+        return None
+    for wanted in TOGETHER:
+        for k, (stem, unit) in enumerate(parsed):
+            metres = known_metres(unit)
+            if stem == wanted and (metres is not None or not unit):
+                return k, metres
+    return None
+
+
 def refuse_raw_las(names: Sequence[str], name: str) -> None:
     """Refuse the fields of LAS as they are stored, as laspy's `points.array` and lazpy's `arrays()` hold them.
 
@@ -135,15 +150,19 @@ def refuse_raw_las(names: Sequence[str], name: str) -> None:
 def _of_fields(array: NDArray[Any], name: str) -> Array:
     names = array.dtype.names or ()
     refuse_raw_las(names, name)
-    lowered = [each.lower() for each in names]
-    together = next((lowered.index(each) for each in TOGETHER if each in lowered), None)
-    if together is not None and "x" not in lowered:
-        return array_points(array[names[together]].reshape(-1, *array.dtype[together].shape), name)
+    together = together_in(names)
+    if together is not None:
+        k, metres = together
+        points = array_points(array[names[k]].reshape(-1, *array.dtype[k].shape), name)
+        return with_what_is_beside(
+            in_metres(points, metres, name), {each: array[each] for each in names}, name
+        )
     axes = axes_in(names, name)
     columns = [np.ravel(array[names[column]]) for column in axes.columns]
     if any(column.dtype.kind not in "fiu" or len(column) != array.size for column in columns):
         raise fault(name, f"its x, y and z are {_short(array)}, not one number each", _as_numbers(columns[0]))
-    return in_metres(stack_axes(*(_numbers(column) for column in columns)), axes.metres, name)
+    points = in_metres(stack_axes(*(_numbers(column) for column in columns)), axes.metres, name)
+    return with_what_is_beside(points, {each: array[each] for each in names}, name)
 
 
 def _numbers(values: NDArray[Any]) -> Array:

@@ -10,14 +10,13 @@ from numpy.typing import NDArray
 
 from hybridreg.io.arrays import refuse_raw_las
 from hybridreg.io.column_names import Axes
-from hybridreg.io.coordinate_systems.length_unit import in_metres
 from hybridreg.io.faults import fault
 from hybridreg.io.formats.text_first_row import axes_of_first_row
 from hybridreg.io.formats.text_names import axes_in_comments, is_number, names_in
 from hybridreg.io.formats.text_rows import parse_rows, text_lines, without_counts
 from hybridreg.io.meaning.first_column import check_first_column, looked_at, refuse_row_numbers
 from hybridreg.io.meaning.image_shapes import refuse_image
-from hybridreg.io.meaning.length_units import as_commented
+from hybridreg.io.meaning.unit_comments import as_commented
 from hybridreg.io.signatures import looks_binary
 
 _COMMENTS = ("#", "//", "%", ";")
@@ -70,9 +69,7 @@ def parse_text(data: bytes, name: str) -> NDArray[np.float64]:
         refuse_raw_las(names, name)
     if named is None:
         _check_first(points, rows, delimiter, name)
-    if axes.metres != 1.0:
-        return in_metres(points, axes.metres, name)
-    return as_commented(points, lines[:first], name)
+    return as_commented(points, lines[:first], name, axes.metres)
 
 
 def _check_first(points: NDArray[np.float64], rows: list[str], delimiter: str | None, name: str) -> None:

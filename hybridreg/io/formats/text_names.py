@@ -17,6 +17,7 @@ def names_in(row: str, delimiter: str | None) -> list[str]:
     """The names in a row of names, with their units and without quotes; none if it is a row of numbers."""
     if delimiter is None:  # a unit belongs to the name before it
         row = re.sub(r"\s+(?=[\[(])", "", row)
+        row = re.sub(r"[\[(][^\[(\])]{0,40}[\])]", lambda unit: re.sub(r"\s+", "", unit.group()), row)
     words = [word.strip().strip("\"'").strip() for word in row.split(delimiter)]
     if any(is_number(word.replace(",", ".")) for word in words):
         return []
