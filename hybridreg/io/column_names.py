@@ -9,6 +9,7 @@ from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 from hybridreg.io.faults import fault, shorten
+from hybridreg.io.meaning.spherical import refuse_spherical
 from hybridreg.io.meaning.unit_words import ANGLES, CELLS, known_metres
 
 _AXES = ("x", "y", "z")
@@ -79,6 +80,8 @@ def axes_in(names: Sequence[str], name: str) -> Axes:
     if {"lon", "lat"} & {stem[:3] for stem in stems} and "x" not in stems:
         problem = f"its columns {held} are longitudes and latitudes"
         raise fault(name, problem, "project them to metres first, for example with pyproj to UTM")
+    if "x" not in stems:
+        refuse_spherical(names, name)
     axis = next(axis for axis in _AXES if stems.count(axis) != 1)
     problem = f"has {stems.count(axis)} fields called {axis!r} among {held}"
     raise fault(name, problem, "name the coordinates x, y and z, each once")

@@ -15,6 +15,7 @@ from hybridreg.io.column_names import axes_in, find_axes
 from hybridreg.io.coordinate_systems.length_unit import in_metres
 from hybridreg.io.faults import fault, shorten
 from hybridreg.io.meaning.beside_points import changes_points, with_what_is_beside
+from hybridreg.io.meaning.first_column import FEWEST
 from hybridreg.io.meaning.image_shapes import refuse_image
 from hybridreg.io.meaning.length_units import one_unit, unit_given
 from hybridreg.io.record_fields import stack_axes
@@ -22,6 +23,7 @@ from hybridreg.io.record_fields import stack_axes
 Array = NDArray[np.float64]
 
 # What pandas, polars and pyarrow call the columns of a file without names.
+_WIDEST = 6  # numbers a point: x, y, z and what sensors add
 _UNNAMED = re.compile(r"(column_?|f|v|_)?\d+", re.IGNORECASE)
 
 
@@ -54,6 +56,7 @@ def points(x: Any, names: list[Any], name: str) -> Array:
     """
     told = [str(each[-1]) if isinstance(each, tuple) else str(each) for each in names]
     unnamed = len(names) >= 3 and all(_UNNAMED.fullmatch(each) for each in told)
+    _refuse_lying(x, len(names), unnamed, name)
     if unnamed:
         refuse_image(len(_numbers(x, 0, names, name)), len(names), name)
     if unnamed and find_axes(told, name) is None:
@@ -70,6 +73,24 @@ def points(x: Any, names: list[Any], name: str) -> Array:
     metres = axes.metres if axes.metres is not None else _unit(x, axes.columns, names, name)
     points = with_what_is_beside(stack_axes(*columns), beside(x, names, axes.columns), name)
     return in_metres(points, metres, name)
+
+
+def _refuse_lying(x: Any, columns: int, unnamed: bool, name: str) -> None:
+    # pandas' tables, whose rows have names too.
+    index = getattr(x, "index", None)
+    if (
+        not unnamed
+        or columns < FEWEST
+        or isinstance(x, Mapping)
+        or not hasattr(x, "iloc")
+        or len(x) > _WIDEST
+    ):
+        return
+    rows = [str(each).lower() for each in index] if index is not None else []
+    if len(rows) >= 3 and ({"x", "y", "z"} <= set(rows) or rows == [str(k) for k in range(len(rows))]):
+        raise fault(
+            name, f"its {len(rows)} rows are x, y and z of {columns} points, not its columns", "give x.T"
+        )
 
 
 def beside(x: Any, names: list[Any], columns: Iterable[int] = ()) -> dict[str, Any]:

@@ -12,10 +12,11 @@ from hybridreg.io.arrays import refuse_raw_las
 from hybridreg.io.column_names import Axes
 from hybridreg.io.faults import fault
 from hybridreg.io.formats.text_first_row import axes_of_first_row
-from hybridreg.io.formats.text_names import axes_in_comments, is_number, names_in
+from hybridreg.io.formats.text_names import axes_in_comments, is_missing, is_number, names_in
 from hybridreg.io.formats.text_rows import parse_rows, text_lines, without_counts
 from hybridreg.io.meaning.first_column import check_first_column, looked_at, refuse_row_numbers
 from hybridreg.io.meaning.image_shapes import refuse_image
+from hybridreg.io.meaning.spherical import tell_spherical
 from hybridreg.io.meaning.unit_comments import as_commented
 from hybridreg.io.signatures import looks_binary
 
@@ -74,8 +75,9 @@ def parse_text(data: bytes, name: str) -> NDArray[np.float64]:
 
 def _check_first(points: NDArray[np.float64], rows: list[str], delimiter: str | None, name: str) -> None:
     """Whether the first column of rows without names, which became x of `points` (N, 3), is one."""
+    tell_spherical(points, name)
     words = rows[0].split(delimiter) if rows else []
-    width = next((k for k, word in enumerate(words) if not is_number(word)), len(words))
+    width = next((k for k, word in enumerate(words) if not (is_number(word) or is_missing(word))), len(words))
     if width <= 3:
         return
     cure = "name the columns in a first row, such as: id x y z"
