@@ -4,13 +4,12 @@
 from __future__ import annotations
 
 import re
-import warnings
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 from hybridreg.io.faults import fault, shorten
 from hybridreg.io.meaning.spherical import refuse_spherical
-from hybridreg.io.meaning.unit_words import ANGLES, CELLS, known_metres
+from hybridreg.io.meaning.unit_words import ANGLES, known_metres, tell_cells
 
 _AXES = ("x", "y", "z")
 # What tools put before or behind an axis: ROS, E57, ParaView, spreadsheets. Not `n` or `v`: normals and velocities.
@@ -132,14 +131,7 @@ def _with_unit(columns: tuple[int, int, int], parsed: Sequence[tuple[str, str]],
     angle = next((unit for unit in units if unit in ANGLES), None)
     if angle is not None:
         raise fault(name, f"its x, y or z is in {angle!r}", "give Cartesian coordinates in metres")
-    cells = next((unit for unit in units if unit in CELLS), None)
-    if cells is not None:
-        warnings.warn(
-            f"{name}: its x, y and z are in {cells!r}, which is no length, and were read as metres; if one of them is "
-            "another length, multiply by it and give the result",
-            UserWarning,
-            stacklevel=3,
-        )
+    tell_cells(units, name)
     known = [known_metres(unit) for unit in units]
     metres = [1.0 if each is None else each for each in known]
     if len(set(metres)) > 1:

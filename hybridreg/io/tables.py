@@ -56,8 +56,8 @@ def points(x: Any, names: list[Any], name: str) -> Array:
     """
     told = [str(each[-1]) if isinstance(each, tuple) else str(each) for each in names]
     unnamed = len(names) >= 3 and all(_UNNAMED.fullmatch(each) for each in told)
-    _refuse_lying(x, len(names), unnamed, name)
     if unnamed:
+        _refuse_lying(x, names, name)
         refuse_image(len(_numbers(x, 0, names, name)), len(names), name)
     if unnamed and find_axes(told, name) is None:
         # Positions again: the first may be none.
@@ -75,22 +75,18 @@ def points(x: Any, names: list[Any], name: str) -> Array:
     return in_metres(points, metres, name)
 
 
-def _refuse_lying(x: Any, columns: int, unnamed: bool, name: str) -> None:
-    # pandas' tables, whose rows have names too.
-    index = getattr(x, "index", None)
-    if (
-        not unnamed
-        or columns < FEWEST
-        or isinstance(x, Mapping)
-        or not hasattr(x, "iloc")
-        or len(x) > _WIDEST
-    ):
+def _refuse_lying(x: Any, names: list[Any], name: str) -> None:
+    # Without names of columns and wide as no points are; pandas' rows may have names.
+    if len(names) < FEWEST or isinstance(x, Mapping):
         return
-    rows = [str(each).lower() for each in index] if index is not None else []
-    if len(rows) >= 3 and ({"x", "y", "z"} <= set(rows) or rows == [str(k) for k in range(len(rows))]):
-        raise fault(
-            name, f"its {len(rows)} rows are x, y and z of {columns} points, not its columns", "give x.T"
+    rows = len(_numbers(x, 0, names, name))
+    if 3 <= rows <= _WIDEST:
+        named = {"x", "y", "z"} <= {str(each).lower() for each in getattr(x, "index", ())}
+        cure = (
+            "give x.T" if named else "give x.to_numpy()" if hasattr(x, "to_numpy") else "transpose it first"
         )
+        problem = f"its {rows} rows of {len(names)} numbers are no points, of which each has a row"
+        raise fault(name, problem, f"if the rows are x, y and z, {cure}")
 
 
 def beside(x: Any, names: list[Any], columns: Iterable[int] = ()) -> dict[str, Any]:

@@ -64,8 +64,8 @@ ARRAYS = (
         "needs three coordinates: save the file again with x, y and z of each point",
     ),
     (
-        r"give one cloud of the batch, a point a row: (x\S+)",
-        r"save one cloud of the batch, a point a row: \1 of the file's array x",
+        r"give one cloud of the batch, a point a row: (x\[.*)",
+        r"save one cloud of the batch, a point a row, of the file's array x: \1",
     ),
     (r"give a point a row: x\.reshape", "save the file again with x.reshape"),
     (r"the first: numpy\.column_stack", "the first, and save the file again with numpy.column_stack"),

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 from hybridreg.io.faults import fault
-from hybridreg.io.meaning.unit_words import metres_of
+from hybridreg.io.meaning.unit_words import metres_of, tell_cells
 
 # Where objects say it: astropy, pint and trimesh; in dictionaries, as those of xarray, pandas, h5py and pyarrow.
 _ATTRIBUTES = ("unit", "units")
@@ -23,7 +23,9 @@ def unit_given(x: Any, name: str) -> float | None:
     ValueError
         The unit is an angle.
     """
-    for word in _words(x):
+    words = list(_words(x))
+    tell_cells(words, name)
+    for word in words:
         metres = metres_of(word, name)
         if metres is not None:
             return metres

@@ -14,7 +14,7 @@ from hybridreg.io.coordinate_systems.length_unit import LengthUnit, in_metres, t
 from hybridreg.io.coordinate_systems.well_known_text import unit_of_text
 from hybridreg.io.faults import shorten
 from hybridreg.io.meaning.scale_comments import tell_scale
-from hybridreg.io.meaning.unit_words import ANGLES, MULTIPLE, has_unit, metres_of
+from hybridreg.io.meaning.unit_words import ANGLES, CELLS, MULTIPLE, has_unit, metres_of, tell_cells
 
 Array = NDArray[np.float64]
 
@@ -76,6 +76,10 @@ _CLAUSE = re.compile(r"[,;|]|\.\s")
 _PLAIN = r"[mcd]m|µm|μm|(?i:(?:milli|centi|deci|micro)met(?:re|er)s?)"
 _AFTER = r"(?i:(?:(?<=in )|(?<=[\[(]))(?:inch(?:es)?|feet|ft|us[ -]ft|km|yd|yards?|mils?))"
 _MENTIONS = re.compile(rf"(?<![\w./\\-])({_PLAIN}|{_AFTER})(?!\w|[./\\-]\w|\s*[:=]?\s*[-+]?\d|\s*[\^²³/])")
+_CELLS = re.compile(
+    rf"(?:^|[^a-z_ ]|\b(?:the|all|xyz|length|coordinates?)[ _-])\s*units?\s*(?:[:=]|is|are)\s*({'|'.join(CELLS)})\b",
+    _FLAGS,
+)
 _LONGEST = 500  # characters of a comment that are looked at
 
 
@@ -93,6 +97,7 @@ def as_commented(points: Array, comments: Iterable[str], name: str, said: float 
         return in_metres(points, said, name)
     unit = unit_in(lines, name)
     if unit is None:
+        tell_cells([found.group(1) for line in lines if (found := _CELLS.search(line))], name)
         _tell_mention(lines, name)
         return points
     tell_stretch(points, unit, name)

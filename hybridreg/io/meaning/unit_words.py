@@ -4,6 +4,8 @@
 from __future__ import annotations
 
 import re
+import warnings
+from collections.abc import Iterable
 
 from hybridreg.io.faults import fault, shorten
 
@@ -88,6 +90,19 @@ def metres_of(word: str, name: str) -> float | None:
             name, f"the unit of its x, y and z is {shorten(word)}", "give Cartesian coordinates in metres"
         )
     return known_metres(word)
+
+
+def tell_cells(words: Iterable[str], name: str) -> None:
+    """Warn where one of the words for the unit of x, y and z is what has no length of its own, such as voxels."""
+    cells = next((word for word in words if word.strip().lower() in CELLS), None)
+    if cells is None:
+        return
+    warnings.warn(
+        f"{name}: its x, y and z are in {cells!r}, which is no length, and were read as metres; if one of them has "
+        "another length, multiply by it and give the result",
+        UserWarning,
+        stacklevel=4,
+    )
 
 
 def _factor(text: str) -> float:

@@ -83,6 +83,9 @@ def test_what_may_change_the_points_is_told(entries: dict[str, Any], words: str,
 def test_points_that_are_not_valid_are_left_out_and_told(key: str, flags: np.ndarray, tmp_path: Path) -> None:
     pd = pytest.importorskip("pandas")
     columns = {**dict(zip("xyz", P.T, strict=True)), key: flags}
+    pd.DataFrame(columns).to_csv(tmp_path / "a.csv", index=False)
+    with pytest.warns(UserWarning, match=rf"a\.csv: 30 of 60 points are not valid by '{key}'"):
+        np.testing.assert_allclose(PointCloud.of(tmp_path / "a.csv").points, P[HALF])
     for x in (
         *ways(tmp_path, {"points": P, key: flags}),
         columns,

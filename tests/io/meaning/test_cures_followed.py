@@ -55,8 +55,12 @@ def test_records_with_several_returns() -> None:
 
 def test_a_table_that_lies_down() -> None:
     pd = pytest.importorskip("pandas")
-    for index in (list("xyz"), ["X", "Y", "Z"], None):
-        np.testing.assert_array_equal(followed(pd.DataFrame(P.T, index=index), r"x\.T"), P)
+    upright = np.roll(P, 1, axis=1)
+    np.testing.assert_array_equal(followed(pd.DataFrame(upright.T, index=list("ZXY")), r"x\.T"), P)
+    for index in (["a", "b", "c"], None):
+        np.testing.assert_array_equal(followed(pd.DataFrame(P.T, index=index), r"x\.to_numpy\(\)"), P)
+    polars = pytest.importorskip("polars")
+    np.testing.assert_array_equal(followed(polars.DataFrame(P.T), r"x\.to_numpy\(\)"), P)
 
 
 @pytest.mark.parametrize(

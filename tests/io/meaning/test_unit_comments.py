@@ -62,7 +62,8 @@ def test_a_unit_in_other_words_is_believed_and_told(comment: str, metres: float)
         "rms (mm): 0.2",
         "intensity values: mm", "beam divergence in mrad, beam diameter (mm)", "positions in frame lidar",
         "angles in deg",
-        "scale 1", "scale: 1 1 1", "display scale 0.5", "colour scale 0 255", "scale 1:500", "full scale 5g",
+        "intensity units: counts", "values: counts", "unit count 12", "scale 1", "scale: 1 1 1", "display scale 0.5",
+        "colour scale 0 255", "scale 1:500", "full scale 5g",
         "scaled 50%", "gaussian scale 0.3", "time offset: 0.3", "timestamp offset 1 2 3", "offset 0 0 0", "offset: 5",
     ],
 )  # fmt: skip
@@ -121,6 +122,14 @@ def test_multiples_behind_the_name_of_a_column(unit: str, metres: float | None, 
         warnings.simplefilter("ignore")
         points = parse_text(f"{head}\n1{mark}2{mark}3\n4{mark}5{mark}6\n".encode(), "a.csv")
     np.testing.assert_allclose(points, TWO * (metres or 1.0))
+
+
+@pytest.mark.parametrize(
+    "comment", ["unit: voxels", "units = pixels", "coordinate units are cells", "all units: LSB"]
+)
+def test_cells_in_a_comment_are_no_length(comment: str) -> None:
+    with pytest.warns(UserWarning, match=r"a\.txt: its x, y and z are in '\w+', which is no length"):
+        np.testing.assert_array_equal(text(comment), TWO)
 
 
 def test_cells_are_no_length() -> None:
