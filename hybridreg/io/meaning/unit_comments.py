@@ -31,10 +31,12 @@ _THINGS = (
 )
 _FLAGS = re.IGNORECASE
 _SYSTEM = re.compile(r'UNIT\s*\[\s*"')  # of a coordinate reference system
+# Each finds what has the unit, then the unit: `length unit: mm`, `unit: 0.1 mm`, `all values in mm`, `vertices (mm)`,
+# `xyz [0.1 mm]`, `x y z mm`, `[mm]`.
 _SAYS = (
     re.compile(rf"(?:([a-z]+)[ _-]+)?(?<![a-z])units?\b\W*(?:(?:is|are|in)\b\W*){{0,2}}({_WORD})", _FLAGS),
     re.compile(rf"()(?<![a-z_-])units?\b\s*(?:(?:[:=]|is|are|in|of)\s*){{1,3}}({MULTIPLE}{_WORD}){_END}", _FLAGS),
-    re.compile(rf"\b({_NUMBERS}|{_THINGS})\b[\w ,]{{0,25}}?\bin ({_MANY})(?!\s*[:=]?\s*\d|-\w)", _FLAGS),
+    re.compile(rf"\b({_NUMBERS}|{_THINGS})\b[\w ,]{{0,25}}?\bin ({_MANY})(?!\s*[:=]?\s*\d|-\w|\s+(?-i:[A-Z]))", _FLAGS),
     re.compile(rf"\b({_NUMBERS})\b\W*[:=(\[]\s*({_WORD})\W*", _FLAGS),
     re.compile(rf"\b(coordinates?|coords?|x\W*y\W*z|positions?|values?)\W*[(\[]\s*({MULTIPLE}{_WORD})\W*", _FLAGS),
     re.compile(rf"\b(x\W*y\W*z)\s+({_WORD})\W*", _FLAGS),
@@ -61,6 +63,7 @@ _MEANS_MORE = (
     "um",
     *ANGLES,
 )
+_PLACES = ("Ft", "Mi")  # as in Ft. Worth
 # Before "unit": what has an angle, where that is x, y and z; what has a length that is not theirs.
 _OF_POINTS = ("", "the", "all", "xyz", "coordinate", "coordinates", "position", "positions")
 _OF_OTHERS = (
@@ -74,7 +77,7 @@ _OTHER = re.compile(rf"(?<![a-z])(?:{'|'.join(_OF_OTHERS)})(?:s|es)?(?![a-z])", 
 _CLAUSE = re.compile(r"[,;|]|\.\s")
 # A unit that is mentioned; two letters in upper case are rather somebody's initials.
 _PLAIN = r"[mcd]m|µm|μm|(?i:(?:milli|centi|deci|micro)met(?:re|er)s?)"
-_AFTER = r"(?i:(?:(?<=in )|(?<=[\[(]))(?:inch(?:es)?|feet|ft|us[ -]ft|km|yd|yards?|mils?))"
+_AFTER = r"(?i:(?:(?<=in )|(?<=[\[(]))(?:inch(?:es)?|feet|(?-i:ft)|us[ -]ft|km|yd|yards?|mils?))"
 _MENTIONS = re.compile(rf"(?<![\w./\\-])({_PLAIN}|{_AFTER})(?!\w|[./\\-]\w|\s*[:=]?\s*[-+]?\d|\s*[\^²³/])")
 _CELLS = re.compile(
     rf"(?:^|[^a-z_ ]|\b(?:the|all|xyz|length|coordinates?)[ _-])\s*units?\s*(?:[:=]|is|are)\s*({'|'.join(CELLS)})\b",
@@ -135,6 +138,8 @@ def _said(text: str) -> Iterator[tuple[str, str]]:
         for found in says.finditer(text):
             what = re.sub(r"[\W_]+|\band\b", "", (found.group(1) or "").lower())
             if whole and (found.end() < len(text) or (says is _SAYS[-1] and found.start() > 0)):
+                continue
+            if k == 2 and found.group(2) in _PLACES:
                 continue
             loose = k == 5 and found.group(2).lower() in _MEANS_MORE
             if (

@@ -65,6 +65,8 @@ def test_a_unit_in_other_words_is_believed_and_told(comment: str, metres: float)
         "intensity units: counts", "values: counts", "unit count 12", "scale 1", "scale: 1 1 1", "display scale 0.5",
         "colour scale 0 255", "scale 1:500", "full scale 5g",
         "scaled 50%", "gaussian scale 0.3", "time offset: 0.3", "timestamp offset 1 2 3", "offset 0 0 0", "offset: 5",
+        "recorded in Ft. Worth", "All scans in Mi Casa", "data in MI State Park",
+        "scale factor x y z:         0.001 0.001 0.001", "offset x y z:     500000 4000000 0",  # las2txt, scaled
     ],
 )  # fmt: skip
 def test_prose_changes_nothing_and_alarms_nobody(comment: str) -> None:
