@@ -161,8 +161,21 @@ def check(points: Array, name: str) -> None:
     scatter = sum(centred @ centred.T for rows in _lots(points) for centred in [(rows - middle) / longest])
     spread = np.linalg.svd(scatter, compute_uv=False)
     if spread[1] <= _THINNEST**2 * spread[0]:
+        _refuse_filled(points, name)
         raise ValueError(
             f"{name}: all {len(points)} points lie on one line; the rotation about it is free, add points off the line"
+        )
+
+
+def _refuse_filled(points: Array, name: str) -> None:
+    # So far away that the others lie in one place beside it: no line of points.
+    away = np.abs(points).max(axis=1)
+    far = points[away == away.max()]
+    if len(far) > 1 and len(points) - len(far) >= MIN_POINTS and (far == far[0]).all():
+        place = ", ".join(f"{each:g}" for each in far[0])
+        raise ValueError(
+            f"{name}: {len(far)} of {len(points)} points lie exactly at ({place}), as drivers write for missing "
+            "returns; remove them"
         )
 
 

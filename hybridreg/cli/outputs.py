@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import errno
 import os
+import tempfile
 from collections.abc import Iterable
 from pathlib import Path
 
@@ -27,8 +28,20 @@ def check_folder(folder: Path | None, written: Iterable[str] = (), read: Iterabl
     elif not os.access(standing, os.W_OK | os.X_OK):
         number = errno.EACCES
     else:
+        _try(standing, folder)
         return
     raise OSError(number, os.strerror(number), str(folder))
+
+
+def _try(standing: Path, folder: Path) -> None:
+    # Permissions do not tell of /proc, of shares and of root.
+    try:
+        os.rmdir(tempfile.mkdtemp(prefix=".hybridreg-", dir=standing))
+    except OSError as error:
+        if error.errno in (errno.ENOENT, errno.EPERM, errno.ENOSYS, errno.EOPNOTSUPP, errno.EINVAL):
+            reason = f"nothing can be written to {standing} ({os.strerror(error.errno)})"
+            raise ValueError(f"{folder}: {reason}; name another folder") from error
+        raise OSError(error.errno, error.strerror, str(folder)) from error
 
 
 def check_file(path: Path | None, out: Path | None = None) -> None:

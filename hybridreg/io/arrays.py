@@ -9,11 +9,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hybridreg.io.column_names import axes_in
+from hybridreg.io.column_names import axes_in, stem_and_unit
 from hybridreg.io.coordinate_systems.length_unit import in_metres
 from hybridreg.io.faults import fault
+from hybridreg.io.meaning.beside_points import with_what_is_beside
 from hybridreg.io.meaning.first_column import FEWEST, check_first_column
 from hybridreg.io.meaning.image_shapes import check_photo, refuse_image
+from hybridreg.io.meaning.spherical import tell_spherical
+from hybridreg.io.meaning.unit_words import known_metres
 from hybridreg.io.record_fields import stack_axes
 
 Array = NDArray[np.float64]
@@ -55,6 +58,7 @@ def array_points(array: NDArray[Any], name: str, *, batched: bool = False, cure:
     if array.dtype.kind not in "fiu":
         raise fault(name, f"coordinates must be numbers, got dtype {_short(array)}", _as_numbers(array))
     rows = _rows(array, name, batched)
+    tell_spherical(rows, name)
     check_first_column(rows, name, cure or f"leave it out: give columns 2 to 4, {_without_first(array)}")
     return _numbers(rows[:, :3])
 
@@ -109,6 +113,13 @@ def _without_first(array: NDArray[Any]) -> str:
 
 
 def _shape_cure(array: NDArray[Any], batched: bool) -> str:
+    shape, channels = array.shape, range(3, _MOST_CHANNELS + 1)
+    if array.ndim >= 4 and shape[-1] in channels:
+        return f"give one cloud of the batch, a point a row: {'x' + '[0]' * (array.ndim - 3)}.reshape(-1, {shape[-1]})"
+    if array.ndim == 4 and shape[1] in channels:
+        return f"give one cloud of the batch, a point a row: x[0].reshape({shape[1]}, -1).T"
+    if array.ndim == 3 and shape[0] in channels and shape[2] > _MOST_CHANNELS and batched:
+        return f"if its {shape[0]} images are x, y and z, give a point a row: x.reshape({shape[0]}, -1).T"
     if array.ndim == 3 and array.shape[2] >= 3 and batched:
         return "give one cloud of the batch, x[0]"
     if array.ndim == 1 and array.size and array.size % 3 == 0:
@@ -116,6 +127,19 @@ def _shape_cure(array: NDArray[Any], batched: bool) -> str:
     if array.ndim == 2 and array.shape[1] == 2:
         return "a pose in space needs three coordinates: numpy.column_stack([x, y, z])"
     return "give one row a point: numpy.column_stack([x, y, z])"
+
+
+def together_in(names: Sequence[Any]) -> tuple[int, float | None] | None:
+    """Which of the names is that of all three coordinates, such as `xyz` or `points_mm`, and its unit in metres."""
+    parsed = [stem_and_unit(str(each)) for each in names]
+    if "x" in [stem for stem, _ in parsed]:
+        return None
+    for wanted in TOGETHER:
+        for k, (stem, unit) in enumerate(parsed):
+            metres = known_metres(unit)
+            if stem == wanted and (metres is not None or not unit):
+                return k, metres
+    return None
 
 
 def refuse_raw_las(names: Sequence[str], name: str) -> None:
@@ -135,15 +159,33 @@ def refuse_raw_las(names: Sequence[str], name: str) -> None:
 def _of_fields(array: NDArray[Any], name: str) -> Array:
     names = array.dtype.names or ()
     refuse_raw_las(names, name)
-    lowered = [each.lower() for each in names]
-    together = next((lowered.index(each) for each in TOGETHER if each in lowered), None)
-    if together is not None and "x" not in lowered:
-        return array_points(array[names[together]].reshape(-1, *array.dtype[together].shape), name)
+    together = together_in(names)
+    if together is not None:
+        k, metres = together
+        points = array_points(array[names[k]].reshape(-1, *array.dtype[k].shape), name)
+        return with_what_is_beside(
+            in_metres(points, metres, name), {each: array[each] for each in names}, name
+        )
     axes = axes_in(names, name)
+    _refuse_several(array.dtype, [names[column] for column in axes.columns], name)
     columns = [np.ravel(array[names[column]]) for column in axes.columns]
     if any(column.dtype.kind not in "fiu" or len(column) != array.size for column in columns):
         raise fault(name, f"its x, y and z are {_short(array)}, not one number each", _as_numbers(columns[0]))
-    return in_metres(stack_axes(*(_numbers(column) for column in columns)), axes.metres, name)
+    points = in_metres(stack_axes(*(_numbers(column) for column in columns)), axes.metres, name)
+    return with_what_is_beside(points, {each: array[each] for each in names}, name)
+
+
+def _refuse_several(dtype: np.dtype[Any], axes: list[str], name: str) -> None:
+    shapes = [dtype[axis].shape for axis in axes]
+    if not any(shapes):
+        return
+    held = ", ".join(str(int(np.prod(shape))) for shape in shapes)
+    cure = "export them with one number each"
+    if len(set(shapes)) == 1 and len(shapes[0]) == 1:
+        cure = (
+            f"choose one, such as the first: numpy.column_stack([x[axis][..., 0].ravel() for axis in {axes}])"
+        )
+    raise fault(name, f"its x, y and z are {held} numbers a point, not one number each", cure)
 
 
 def _numbers(values: NDArray[Any]) -> Array:

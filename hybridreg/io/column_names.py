@@ -8,7 +8,8 @@ from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 from hybridreg.io.faults import fault, shorten
-from hybridreg.io.meaning.length_units import ANGLES, known_metres
+from hybridreg.io.meaning.spherical import refuse_spherical
+from hybridreg.io.meaning.unit_words import ANGLES, known_metres, tell_cells
 
 _AXES = ("x", "y", "z")
 # What tools put before or behind an axis: ROS, E57, ParaView, spreadsheets. Not `n` or `v`: normals and velocities.
@@ -22,14 +23,16 @@ _SURVEY = (
     ("northing", "northings", "n", "utm_northing", "utm_n", "utm_y", "y_utm"),
     ("height", "elevation", "elev", "altitude", "h", "u", "z", "utm_z", "z_utm"),
 )
-_NAME = re.compile(r"(.*?)\s*(?:[\[(]([^\])]*)[\])]?|[/|]\s*([^/|]+)|[_ ](mm|cm|dm|m|km|ft|us[_-]?ft|ftus))?")
+# Not `in`, which is the counterpart of `out` too.
+_ENDS = r"[mcdkuµ]?m|ft|us[_-]?ft|ftus|feet|inch|inches|yd|(?:milli|centi|deci|kilo)?met(?:er|re)s?"
+_NAME = re.compile(rf"(.*?)\s*(?:[\[(]([^\])]*)[\])]?|[/|]\s*([^/|]+)|[_ ]({_ENDS}))?")
 
 
 class Axes(NamedTuple):
-    """Columns of x, y and z, and their unit in metres; 1 where the names do not give a unit."""
+    """Columns of x, y and z, and their unit in metres; None where the names do not give one."""
 
     columns: tuple[int, int, int]
-    metres: float = 1.0
+    metres: float | None = None
 
 
 def find_axes(names: Sequence[str], name: str) -> Axes | None:
@@ -76,6 +79,8 @@ def axes_in(names: Sequence[str], name: str) -> Axes:
     if {"lon", "lat"} & {stem[:3] for stem in stems} and "x" not in stems:
         problem = f"its columns {held} are longitudes and latitudes"
         raise fault(name, problem, "project them to metres first, for example with pyproj to UTM")
+    if "x" not in stems:
+        refuse_spherical(names, name)
     axis = next(axis for axis in _AXES if stems.count(axis) != 1)
     problem = f"has {stems.count(axis)} fields called {axis!r} among {held}"
     raise fault(name, problem, "name the coordinates x, y and z, each once")
@@ -126,8 +131,10 @@ def _with_unit(columns: tuple[int, int, int], parsed: Sequence[tuple[str, str]],
     angle = next((unit for unit in units if unit in ANGLES), None)
     if angle is not None:
         raise fault(name, f"its x, y or z is in {angle!r}", "give Cartesian coordinates in metres")
-    metres = [known_metres(unit) or 1.0 for unit in units]
+    tell_cells(units, name)
+    known = [known_metres(unit) for unit in units]
+    metres = [1.0 if each is None else each for each in known]
     if len(set(metres)) > 1:
         told = ", ".join(unit or "none" for unit in units)
         raise fault(name, f"the units of its x, y and z differ: {told}", "give all three in one unit")
-    return Axes(columns, metres[0])
+    return Axes(columns, metres[0] if any(each is not None for each in known) else None)

@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hybridreg.io.arrays import TOGETHER
+from hybridreg.io.arrays import together_in
+from hybridreg.io.coordinate_systems.length_unit import in_metres
 from hybridreg.io.faults import fault, shorten
 
 Array = NDArray[np.float64]
@@ -25,9 +26,9 @@ def listed_points(x: Any, names: list[Any], name: str) -> Array | None:
     ValueError
         Lists of unequal length, or of something else than numbers.
     """
-    lowered = [str(each).lower() for each in names]
-    together = next((lowered.index(each) for each in TOGETHER if each in lowered), None)
-    if {"x", "y", "z"} & set(lowered) or (together is None and len(names) != 1):
+    found = together_in(names)
+    together = None if found is None else found[0]
+    if {"x", "y", "z"} & {str(each).lower() for each in names} or (together is None and len(names) != 1):
         return None
     label = names[together or 0]
     column = x.column(label) if hasattr(x, "column") and hasattr(x, "schema") else x[label]
@@ -37,7 +38,9 @@ def listed_points(x: Any, names: list[Any], name: str) -> Array | None:
     listed = values if values.ndim == 2 else _stacked(values, label, name)
     # A lone column of another name may hold anything: a quaternion, an image.
     most = _MOST if together is not None else 3
-    return listed if listed is not None and 3 <= listed.shape[1] <= most else None
+    if listed is None or not 3 <= listed.shape[1] <= most:
+        return None
+    return listed if found is None or found[1] is None else in_metres(listed[:, :3], found[1], name)
 
 
 def _stacked(values: NDArray[Any], label: Any, name: str) -> Array | None:

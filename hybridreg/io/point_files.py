@@ -132,6 +132,8 @@ def read_recorded(path: str | os.PathLike[str], selection: Selection = ANY) -> R
     ValueError
         Also where a cloud is chosen from a file that holds one, or by what its kind of file does not have.
     """
+    if not os.fspath(path):
+        raise fault(repr(path), "the path of the cloud is empty", "give that of a file")
     path = Path(path)
     if _is_folder(path) and (path / "metadata.yaml").is_file():
         return read_bag(path, selection)

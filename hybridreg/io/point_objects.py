@@ -12,12 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybridreg.io import tables
-from hybridreg.io.arrays import TOGETHER, array_points
+from hybridreg.io.arrays import array_points, together_in
 from hybridreg.io.coordinate_systems.las_extended import records_of_header
 from hybridreg.io.coordinate_systems.las_units import metres_of_las
 from hybridreg.io.coordinate_systems.length_unit import in_metres
 from hybridreg.io.formats.las_withheld import without_withheld
 from hybridreg.io.list_columns import listed_points
+from hybridreg.io.meaning.beside_points import refuse_second_cloud, with_what_is_beside
 from hybridreg.io.meaning.length_units import unit_given
 from hybridreg.io.recorded import ros_messages, vtk_objects
 
@@ -83,7 +84,7 @@ def points_of(x: Any, name: str, depth: int = 0) -> Array:
         rows = _named_rows(x)
         if rows is not None:
             return points_of(rows, name, depth + 1)
-    points = _from_array(_as_array(x, name), name)
+    points = with_what_is_beside(_from_array(_as_array(x, name), name), tables.attributes_beside(x), name)
     return in_metres(points, unit_given(x, name), name)
 
 
@@ -108,17 +109,25 @@ def _from_table(x: Any, names: list[Any], name: str, depth: int) -> Array:
             _refuse(x, name, f"it is not computed yet; pass what its {first}() returns")
     if "geometry" in names and hasattr(x, "get_coordinates"):
         _refuse(x, name, "pass x.get_coordinates(include_z=True)")
-    lowered = [str(each).lower() for each in names]
-    if "x" not in lowered and depth < _DEEPEST and isinstance(x, Mapping):
-        together = next(
-            (names[lowered.index(each)] for each in (*TOGETHER, "arr_0") if each in lowered), None
-        )
-        if together is not None:
-            return _held_points(x[together], x, name, depth)
+    if depth < _DEEPEST and isinstance(x, Mapping):
+        found = together_in(names) or ((names.index("arr_0"), None) if "arr_0" in names else None)
+        if found is not None:
+            return _entry(x, names[found[0]], found[1], name, depth)
     listed = None if isinstance(x, Mapping) else listed_points(x, names, name)
     if listed is not None:
         return _from_array(listed, name)
     return tables.points(x, names, name)
+
+
+def _entry(x: Mapping[Any, Any], key: Any, metres: float | None, name: str, depth: int) -> Array:
+    if metres is None:
+        points = _held_points(x[key], x, name, depth)
+    else:
+        points = in_metres(points_of(x[key], name, depth + 1), metres, name)
+    if key == "arr_0":  # numpy's archives
+        unnamed = [(each, x[each]) for each in x if str(each).startswith("arr_") and each != key]
+        refuse_second_cloud(points, [each for each in unnamed if isinstance(each[1], np.ndarray)], name)
+    return with_what_is_beside(points, tables.beside(x, list(x)), name)
 
 
 def _from_vtk(x: Any, name: str) -> Array:

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybridreg.io.faults import fault, shorten
+from hybridreg.io.meaning.spherical import refuse_spherical
 
 AXES = ("x", "y", "z")
 
@@ -26,6 +27,8 @@ def whole_number(text: str, name: str, what: str) -> int:
 def axis_columns(fields: Sequence[str], name: str) -> tuple[int, int, int]:
     """Indices of x, y and z among `fields`, in upper or lower case."""
     lowered = [field.lower() for field in fields]
+    if "x" not in lowered:
+        refuse_spherical(fields, name)
     for axis in AXES:
         if lowered.count(axis) != 1:
             held = shorten(", ".join(fields), 200)

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
@@ -14,6 +14,8 @@ from hybridreg.io.arrays import array_points, refuse_raw_las
 from hybridreg.io.column_names import axes_in, find_axes
 from hybridreg.io.coordinate_systems.length_unit import in_metres
 from hybridreg.io.faults import fault, shorten
+from hybridreg.io.meaning.beside_points import changes_points, with_what_is_beside
+from hybridreg.io.meaning.first_column import FEWEST
 from hybridreg.io.meaning.image_shapes import refuse_image
 from hybridreg.io.meaning.length_units import one_unit, unit_given
 from hybridreg.io.record_fields import stack_axes
@@ -21,6 +23,7 @@ from hybridreg.io.record_fields import stack_axes
 Array = NDArray[np.float64]
 
 # What pandas, polars and pyarrow call the columns of a file without names.
+_WIDEST = 6  # numbers a point: x, y, z and what sensors add
 _UNNAMED = re.compile(r"(column_?|f|v|_)?\d+", re.IGNORECASE)
 
 
@@ -54,6 +57,7 @@ def points(x: Any, names: list[Any], name: str) -> Array:
     told = [str(each[-1]) if isinstance(each, tuple) else str(each) for each in names]
     unnamed = len(names) >= 3 and all(_UNNAMED.fullmatch(each) for each in told)
     if unnamed:
+        _refuse_lying(x, names, name)
         refuse_image(len(_numbers(x, 0, names, name)), len(names), name)
     if unnamed and find_axes(told, name) is None:
         # Positions again: the first may be none.
@@ -66,8 +70,42 @@ def points(x: Any, names: list[Any], name: str) -> Array:
         raise fault(name, f"x, y and z have the lengths {lengths}", "give them equally long")
     if all(np.array_equal(column, np.round(column)) for column in columns):
         refuse_raw_las(told, name)
-    metres = axes.metres if axes.metres != 1.0 else _unit(x, axes.columns, names, name)
-    return in_metres(stack_axes(*columns), metres, name)
+    metres = axes.metres if axes.metres is not None else _unit(x, axes.columns, names, name)
+    points = with_what_is_beside(stack_axes(*columns), beside(x, names, axes.columns), name)
+    return in_metres(points, metres, name)
+
+
+def _refuse_lying(x: Any, names: list[Any], name: str) -> None:
+    # Without names of columns and wide as no points are; pandas' rows may have names.
+    if len(names) < FEWEST or isinstance(x, Mapping):
+        return
+    rows = len(_numbers(x, 0, names, name))
+    if 3 <= rows <= _WIDEST:
+        named = {"x", "y", "z"} <= {str(each).lower() for each in getattr(x, "index", ())}
+        cure = (
+            "give x.T" if named else "give x.to_numpy()" if hasattr(x, "to_numpy") else "transpose it first"
+        )
+        problem = f"its {rows} rows of {len(names)} numbers are no points, of which each has a row"
+        raise fault(name, problem, f"if the rows are x, y and z, {cure}")
+
+
+def beside(x: Any, names: list[Any], columns: Iterable[int] = ()) -> dict[str, Any]:
+    """What may change the points of a table: other entries, its attributes, and those of its three `columns`."""
+    found = {str(each): _column(x, k, names) for k, each in enumerate(names) if changes_points(each)}
+    found.update(attributes_beside(x))
+    each_has = [attributes_beside(_column(x, k, names)) for k in columns]
+    for key in set(each_has[0]).intersection(*each_has[1:]) if each_has else ():
+        found[key] = [np.ravel(each[key])[0] for each in each_has]
+    return found
+
+
+def attributes_beside(x: Any) -> dict[str, Any]:
+    """Those attributes of an object that may change its points."""
+    # As NetCDF and HDF5 keep them: xarray's and h5py's; pandas has them too.
+    attributes = getattr(x, "attrs", None)
+    if not isinstance(attributes, Mapping):
+        return {}
+    return {str(key): value for key, value in attributes.items() if changes_points(key)}
 
 
 def _unit(x: Any, columns: tuple[int, int, int], names: list[Any], name: str) -> float | None:

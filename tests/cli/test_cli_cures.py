@@ -56,6 +56,25 @@ def test_every_phrase_is_one_that_the_library_says() -> None:
         assert core in source or core.replace("smaller", "larger") in source, said
 
 
+@pytest.mark.parametrize(
+    "array, cure",
+    [
+        (
+            np.ones((2, 20, 25, 3)),
+            "save one cloud of the batch, a point a row, of the file's array x: x[0].reshape(-1, 3)",
+        ),
+        (np.ones((2, 3, 20, 25)), "of the file's array x: x[0].reshape(3, -1).T"),
+        (
+            np.zeros(60, [(axis, "f4", 2) for axis in "xyz"]),
+            "and save the file again with numpy.column_stack([x[",
+        ),
+    ],
+)
+def test_cures_for_the_array_in_a_file(array: np.ndarray, cure: str, cloud: Path) -> None:
+    np.save(cloud / "a.npy", array)
+    assert cure in " ".join(register(cloud / "a.npy", cloud / "whole.npy").stderr.split())
+
+
 def test_every_option_exists() -> None:
     known = "".join(call(name, "--help").output for name in ("register", "together", "train"))
     for means in (*(each for _, several in CURES for each in several), *(named for _, named in VALUES)):

@@ -12,6 +12,7 @@ from typer.testing import CliRunner, Result
 import hybridreg as hr
 from hybridreg import testing
 from hybridreg.cli.app import app
+from hybridreg.cli.outputs import check_folder
 from hybridreg.io import write_points
 
 PLAIN = ["--set", "match=none", "--set", "estimate=identity", "--set", "refine=none"]
@@ -92,3 +93,14 @@ def test_clouds_go_into_the_folder_that_is_made(clouds: list[str]) -> None:
 def test_a_stage_without_fields_says_so(clouds: list[str]) -> None:
     done = call("register", *clouds, "--set", "refine=none", "--set", "refine.kind=plane")
     assert "argument 'kind'; it has no fields" in " ".join(done.output.split())
+
+
+@pytest.mark.skipif(not Path("/proc/self").is_dir(), reason="needs /proc")
+def test_a_folder_in_which_nothing_can_be_made_is_told_before_the_work(tmp_path: Path) -> None:
+    for folder in (Path("/proc/x"), Path("/proc/x/y")):
+        with pytest.raises(
+            ValueError, match=r"^/proc/x.*: nothing can be written to /proc .*; name another folder"
+        ):
+            check_folder(folder)
+    check_folder(tmp_path / "new" / "one")
+    assert not list(tmp_path.iterdir())

@@ -63,6 +63,12 @@ ARRAYS = (
         r"needs three coordinates: numpy\.column_stack\(\[x, y, z\]\)",
         "needs three coordinates: save the file again with x, y and z of each point",
     ),
+    (
+        r"give one cloud of the batch, a point a row: (x\[.*)",
+        r"save one cloud of the batch, a point a row, of the file's array x: \1",
+    ),
+    (r"give a point a row: x\.reshape", "save the file again with x.reshape"),
+    (r"the first: numpy\.column_stack", "the first, and save the file again with numpy.column_stack"),
     (r"give one row a point: numpy\.column_stack\(\[x, y, z\]\)", "save the file again with one row x, y, z a point"),
     (
         r"give an array of numbers, one point a row: numpy\.column_stack\(\[x, y, z\]\)",

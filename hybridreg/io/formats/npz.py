@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import io
+import re
 import zipfile
 
 import numpy as np
@@ -11,15 +12,25 @@ from numpy.typing import NDArray
 
 from hybridreg.io import tables
 from hybridreg.io.arrays import array_points
-from hybridreg.io.column_names import find_axes
+from hybridreg.io.column_names import find_axes, stem_and_unit
 from hybridreg.io.coordinate_systems.length_unit import in_metres
-from hybridreg.io.faults import fault, foreign_parser
+from hybridreg.io.faults import fault, foreign_parser, shorten
 from hybridreg.io.formats.npy import array_of_npy, npy_header
+from hybridreg.io.meaning.beside_points import (
+    changes_points,
+    is_no_points,
+    refuse_second_cloud,
+    with_what_is_beside,
+)
 from hybridreg.io.meaning.first_column import FEWEST
 from hybridreg.io.meaning.image_shapes import is_image
 from hybridreg.io.meaning.length_units import unit_given
+from hybridreg.io.meaning.unit_words import known_metres
 
 _UNITS = ("unit", "units", "length_unit")
+_UNNAMED = re.compile(
+    r"arr_[1-9]\d*"
+)  # what numpy.savez calls the second array without a name, and those after it
 _KEYS = ("xyz", "points", "arr_0")
 _MODEST = 2**28  # bytes that are unpacked in any case
 # Coordinates hardly compress (up to 20 times on a coarse grid); noise of zeros compresses a thousandfold.
@@ -35,6 +46,10 @@ def parse_npz(data: bytes, name: str) -> NDArray[np.float64]:
     with archive:
         keys = _cloud_keys(archive, name)
         arrays = {key: _array(archive, key, name) for key in keys}
+        names = [member[:-4] for member in archive.namelist() if member.endswith(".npy")]
+        beside = _numbers(archive, [key for key in names if key not in keys and changes_points(key)], name)
+        unnamed = [key for key in names if _UNNAMED.fullmatch(key)] if keys == ["arr_0"] else []
+        others = _numbers(archive, unnamed, name).items()
         with foreign_parser(name, "a zip archive of arrays"):
             words = {
                 each: archive.read(f"{each}.npy") for each in _UNITS if f"{each}.npy" in archive.namelist()
@@ -43,7 +58,20 @@ def parse_npz(data: bytes, name: str) -> NDArray[np.float64]:
     points = (
         array_points(arrays[keys[0]], _label(name, keys[0])) if single else tables.points(arrays, keys, name)
     )
-    return in_metres(points, unit_given({each: _text(words[each], name) for each in words}, name), name)
+    if single and keys[0] == "arr_0":
+        refuse_second_cloud(points, others, name)
+    points = with_what_is_beside(points, beside, name)
+    said = known_metres(stem_and_unit(keys[0])[1]) if single else None
+    if said is None:
+        said = unit_given({each: _text(words[each], name) for each in words}, name)
+    return in_metres(points, said, name)
+
+
+def _numbers(archive: zipfile.ZipFile, wanted: list[str], name: str) -> dict[str, NDArray[np.generic]]:
+    """Those of the arrays that hold plain numbers."""
+    return {
+        key: _array(archive, key, name) for key in wanted if _shape_and_kind(archive, key, name)[1] in "fiub"
+    }
 
 
 def _text(content: bytes, name: str) -> str:
@@ -74,10 +102,15 @@ def _refuse_bomb(member: zipfile.ZipInfo, label: str) -> None:
 def _cloud_keys(archive: zipfile.ZipFile, name: str) -> list[str]:
     """The one array that holds the cloud, or those of x, y and z."""
     keys = [member[:-4] for member in archive.namelist() if member.endswith(".npy")]
-    for key in _KEYS:
-        if key in keys:
-            return [key]
-    shapes = {key: _shape(archive, key, name) for key in keys}
+    for wanted in _KEYS:
+        if wanted in keys:
+            return [wanted]
+        in_unit = [
+            key for key in keys if (parsed := stem_and_unit(key))[0] == wanted and known_metres(parsed[1])
+        ]
+        if len(in_unit) == 1:
+            return in_unit
+    shapes = {key: _shape_and_kind(archive, key, name)[0] for key in keys}
     flat = [key for key, shape in shapes.items() if len(shape) == 2 and shape[1] >= 3]
     # A depth image or a matrix beside the cloud is no second cloud; alone it is refused as what it is.
     clouds = [key for key in flat if not is_image(*shapes[key]) and max(shapes[key]) >= FEWEST]
@@ -86,17 +119,19 @@ def _cloud_keys(archive: zipfile.ZipFile, name: str) -> list[str]:
         return [keys[column] for column in axes.columns]
     if len(keys) == 1 and len(shapes[keys[0]]) == 1:
         return keys  # records, or numbers in one row, of which `array_points` tells
-    fitting = clouds or flat
+    fitting = [key for key in clouds or flat if not is_no_points(stem_and_unit(key)[0])]
     if len(fitting) != 1:
         held = ", ".join(f"{key} {shape}" for key, shape in shapes.items()) or "no array"
         problem = f"has no array {' or '.join(_KEYS)}, and {len(fitting)} of shape (N, 3) under other names"
+        if clouds and not fitting:
+            problem = f"has no points: {shorten(', '.join(clouds))} is something else by its name"
         raise fault(name, f"{problem}; it holds {held[:200]}", "save the cloud as the array 'xyz'")
     return fitting
 
 
-def _shape(archive: zipfile.ZipFile, key: str, name: str) -> tuple[int, ...]:
+def _shape_and_kind(archive: zipfile.ZipFile, key: str, name: str) -> tuple[tuple[int, ...], str]:
     label = _label(name, key)
     with foreign_parser(label, "a zip archive of arrays"), archive.open(f"{key}.npy") as member:
         head = member.read(_LONGEST_HEADER)
-    shape, _, _, _ = npy_header(head, label)
-    return shape
+    shape, _, dtype, _ = npy_header(head, label)
+    return shape, dtype.kind

@@ -15,7 +15,7 @@ from hybridreg.io.faults import fault
 from hybridreg.io.formats.lzf import lzf_decompress
 from hybridreg.io.formats.pcd_header import PcdHeader, parse_pcd_header
 from hybridreg.io.formats.text_rows import parse_rows, promised_lines, text_lines
-from hybridreg.io.meaning.length_units import as_commented, unit_in
+from hybridreg.io.meaning.unit_comments import as_commented, unit_in
 from hybridreg.io.record_fields import XyzRecord, axis_columns, stack_axes
 
 _MOST_EXPANSION = 88  # three bytes of LZF make at most 264

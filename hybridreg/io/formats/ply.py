@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from hybridreg.io.faults import fault
 from hybridreg.io.formats.ply_header import Element, PlyHeader, Property, parse_ply_header
 from hybridreg.io.formats.text_rows import parse_rows, promised_lines, text_lines
-from hybridreg.io.meaning.length_units import as_commented
+from hybridreg.io.meaning.unit_comments import as_commented
 from hybridreg.io.record_fields import XyzRecord, axis_columns
 
 _STRUCT_CODES = {"i1": "b", "u1": "B", "i2": "h", "u2": "H", "i4": "i", "u4": "I", "i8": "q", "u8": "Q",

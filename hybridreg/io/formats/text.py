@@ -10,18 +10,20 @@ from numpy.typing import NDArray
 
 from hybridreg.io.arrays import refuse_raw_las
 from hybridreg.io.column_names import Axes
-from hybridreg.io.coordinate_systems.length_unit import in_metres
 from hybridreg.io.faults import fault
 from hybridreg.io.formats.text_first_row import axes_of_first_row
-from hybridreg.io.formats.text_names import axes_in_comments, is_number, names_in
+from hybridreg.io.formats.text_names import axes_in_comments, is_missing, is_number, names_in
 from hybridreg.io.formats.text_rows import parse_rows, text_lines, without_counts
+from hybridreg.io.meaning.beside_points import changes_points, with_what_is_beside
 from hybridreg.io.meaning.first_column import check_first_column, looked_at, refuse_row_numbers
 from hybridreg.io.meaning.image_shapes import refuse_image
-from hybridreg.io.meaning.length_units import as_commented
+from hybridreg.io.meaning.spherical import tell_spherical
+from hybridreg.io.meaning.unit_comments import as_commented
 from hybridreg.io.signatures import looks_binary
 
 _COMMENTS = ("#", "//", "%", ";")
 _EXCEL = "sep="  # the row that tells Excel the separator
+_FLAGS = {"true": "1", "false": "0", "yes": "1", "no": "0"}
 _DECIMAL_COMMA = re.compile(r"[-+]?\d+(,\d+)?([eE][-+]?\d+)?")
 _POSITION = Axes((0, 1, 2))
 
@@ -70,15 +72,28 @@ def parse_text(data: bytes, name: str) -> NDArray[np.float64]:
         refuse_raw_las(names, name)
     if named is None:
         _check_first(points, rows, delimiter, name)
-    if axes.metres != 1.0:
-        return in_metres(points, axes.metres, name)
-    return as_commented(points, lines[:first], name)
+    if names and any(map(changes_points, names)):
+        points = with_what_is_beside(points, _beside(rows, names, delimiter), name)
+    return as_commented(points, lines[:first], name, axes.metres)
+
+
+def _beside(rows: list[str], names: list[str], delimiter: str | None) -> dict[str, list[float]]:
+    """The columns of flags or numbers that may change the points."""
+    cells = [row.split(delimiter) for row in rows]
+    found = {}
+    for k in (k for k, each in enumerate(names) if changes_points(each)):
+        words = [row[k].strip(' "').lower() if k < len(row) else "" for row in cells]
+        words = [_FLAGS.get(word, word) for word in words]
+        if all(map(is_number, words)):
+            found[names[k]] = [float(word) for word in words]
+    return found
 
 
 def _check_first(points: NDArray[np.float64], rows: list[str], delimiter: str | None, name: str) -> None:
     """Whether the first column of rows without names, which became x of `points` (N, 3), is one."""
+    tell_spherical(points, name)
     words = rows[0].split(delimiter) if rows else []
-    width = next((k for k, word in enumerate(words) if not is_number(word)), len(words))
+    width = next((k for k, word in enumerate(words) if not (is_number(word) or is_missing(word))), len(words))
     if width <= 3:
         return
     cure = "name the columns in a first row, such as: id x y z"

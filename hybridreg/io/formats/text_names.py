@@ -10,6 +10,11 @@ from hybridreg.io.column_names import Axes, find_axes
 
 # What stands before the names in a comment.
 _TITLE = re.compile(r"\w+\s*[:=]\s+|(columns|fields|format|header|names)\W+", re.IGNORECASE)
+# Of pandas, R, MySQL, Excel, and of C's library on Windows.
+_MISSING = re.compile(
+    r"|null|none|nil|n/?a|<na>|-{1,2}|\?|\\n|missing|#(?:n/a|num!|value!|div/0!)|[-+]?nan\(\w*\)|[-+]?1\.#\w+",
+    re.IGNORECASE,
+)
 _MARKS = "#/%; \t"
 
 
@@ -17,8 +22,9 @@ def names_in(row: str, delimiter: str | None) -> list[str]:
     """The names in a row of names, with their units and without quotes; none if it is a row of numbers."""
     if delimiter is None:  # a unit belongs to the name before it
         row = re.sub(r"\s+(?=[\[(])", "", row)
+        row = re.sub(r"[\[(][^\[(\])]{0,40}[\])]", lambda unit: re.sub(r"\s+", "", unit.group()), row)
     words = [word.strip().strip("\"'").strip() for word in row.split(delimiter)]
-    if any(is_number(word.replace(",", ".")) for word in words):
+    if any(is_number(word.replace(",", ".")) for word in words) or all(map(is_missing, words)):
         return []
     return _of_all(words) if delimiter is None else words
 
@@ -52,6 +58,11 @@ def is_number(word: str) -> bool:
     except ValueError:
         return False
     return True
+
+
+def is_missing(word: str) -> bool:
+    """Whether a cell is what tools write for a number that is missing or not finite; `nan` is a number."""
+    return _MISSING.fullmatch(word.strip(' "\t')) is not None
 
 
 def lists_in(comment: str, delimiter: str | None) -> Iterator[list[str]]:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybridreg.io.faults import fault, shorten
-from hybridreg.io.formats.text_names import is_number
+from hybridreg.io.formats.text_names import is_missing, is_number
 
 # Values in the rows behind a PTX scan's two counts: the scanner's place and axes, and a matrix.
 _PTX = [3, 3, 3, 3, 4, 4, 4, 4]
@@ -60,7 +60,7 @@ def without_counts(rows: list[str], name: str) -> list[str]:
 def parse_rows(
     lines: list[str], columns: tuple[int, int, int], name: str, delimiter: str | None = None
 ) -> NDArray[np.float64]:
-    """The numbers in `columns` of each line, shape (N, 3)."""
+    """The numbers in `columns` of each line, shape (N, 3); NaN for a cell that is empty or says that it has none."""
     if not lines:
         return np.empty((0, 3))
     try:
@@ -71,8 +71,21 @@ def parse_rows(
         if apart is not None:
             problem = f"its numbers have separators of thousands: {shorten(lines[0])}"
             raise fault(name, problem, "export them without") from error
+        filled = [_with_nans(line, columns, delimiter) for line in lines]
+        if filled != lines:
+            return parse_rows(filled, columns, name, delimiter)
         problem = _first_bad_row(lines, columns, delimiter) or shorten(error, 200)
         raise fault(name, problem, "remove or repair the row") from error
+
+
+def _with_nans(line: str, columns: tuple[int, int, int], delimiter: str | None) -> str:
+    values = line.split(delimiter)
+    missing = [column for column in columns if column < len(values) and is_missing(values[column])]
+    if not missing:
+        return line
+    for column in missing:
+        values[column] = "nan"
+    return (delimiter or " ").join(values)
 
 
 def _first_bad_row(lines: list[str], columns: tuple[int, int, int], delimiter: str | None) -> str:

@@ -11,7 +11,7 @@ import numpy as np
 from hybridreg.io.column_names import stem_and_unit
 from hybridreg.io.coordinate_systems.length_unit import in_metres
 from hybridreg.io.formats.text_names import lists_in
-from hybridreg.io.meaning.length_units import known_metres
+from hybridreg.io.meaning.unit_words import known_metres
 
 _AXES = "xyz"
 _WIDEST = 100  # columns of a table that holds a pose

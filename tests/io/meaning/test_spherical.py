@@ -1,0 +1,84 @@
+# SPDX-License-Identifier: MIT
+"""Angles and ranges in the place of x, y and z."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hybridreg import PointCloud
+from hybridreg.io.formats.ply import parse_ply
+from hybridreg.io.formats.text import parse_text
+
+G = np.random.default_rng(0)
+AZIMUTH = G.random(2000) * 360.0
+ELEVATION = np.tile(np.linspace(-15.0, 15.0, 16), 125)
+RANGE = G.random(2000) * 50.0
+SPHERE = np.column_stack([AZIMUTH, ELEVATION, RANGE])
+CENTRED = SPHERE - [180.0, 0.0, 0.0]
+
+
+@pytest.mark.parametrize(
+    "names",
+    [
+        ("azimuth", "elevation", "range"), ("range", "azimuth", "elevation"), ("theta", "phi", "r"),
+        ("Azimuth (deg)", "Elevation (deg)", "Distance (m)"), ("az_rad", "el_rad", "range_m"),
+        ("sphericalRange", "sphericalAzimuth", "sphericalElevation"), ("dist", "horizontal_angle", "vertical_angle"),
+    ],
+)  # fmt: skip
+def test_columns_of_angles_are_not_told_to_be_called_x(names: tuple[str, ...]) -> None:
+    pd = pytest.importorskip("pandas")
+    records = np.zeros(60, [(each, "f4") for each in names])
+    rows = "\n".join(",".join(f"{each:.4f}" for each in row) for row in SPHERE[:60])
+    axes = "".join(f"property float {each}\n" for each in names)
+    head = f"ply\nformat ascii 1.0\nelement vertex 60\n{axes}end_header\n"
+    for read in (
+        lambda: PointCloud.of(records),
+        lambda: PointCloud.of(pd.DataFrame(SPHERE, columns=names)),
+        lambda: parse_text((",".join(names) + "\n" + rows).encode(), "cloud"),
+        lambda: parse_ply((head + rows.replace(",", " ") + "\n").encode(), "cloud"),
+    ):
+        with pytest.raises(
+            ValueError, match=r"^cloud: .*angles and ranges.*convert them to x, y and z"
+        ) as caught:
+            read()
+        assert "name the coordinates" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    "rows",
+    [
+        SPHERE,
+        CENTRED,
+        np.roll(SPHERE, 1, axis=1),
+        SPHERE[:, [1, 0, 2]],
+        np.column_stack([np.radians(CENTRED[:, :2]), RANGE]),
+        np.column_stack([SPHERE, G.random(2000)]),
+    ],
+)
+def test_angles_without_names_are_told(rows: np.ndarray, tmp_path: Path) -> None:
+    np.savetxt(tmp_path / "a.csv", rows, "%.4f", delimiter=",")
+    for x in (rows, tmp_path / "a.csv"):
+        with pytest.warns(UserWarning, match=r"look like azimuth, elevation and range; if they are, convert"):
+            PointCloud.of(x)
+
+
+X, Y = np.meshgrid(np.linspace(0.0, 360.0, 361), np.linspace(0.0, 80.0, 41))
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize(
+    "rows",
+    [
+        np.column_stack([X.ravel(), Y.ravel(), G.random(X.size)]),  # heights on a grid
+        SPHERE + [0.0, 0.0, -1.0],
+        SPHERE * [0.9, 1.0, 1.0],
+        SPHERE + [30.0, 0.0, 0.0],
+        SPHERE * [1.0, 10.0, 1.0],
+        np.column_stack([AZIMUTH, G.random(2000) * 30, RANGE]),
+    ],
+)
+def test_clouds_that_only_resemble_angles_are_read(rows: np.ndarray) -> None:
+    np.testing.assert_array_equal(PointCloud.of(rows).points, rows)
