@@ -14,7 +14,7 @@ from hybridreg.evidence.information import Information
 from hybridreg.evidence.range_offset import RangeOffset
 from hybridreg.evidence.stretch import Stretch
 from hybridreg.resolution import Tolerance
-from hybridreg.verdict.confidence import CLEAR, LIKELY, SIZE_GAIN, SPARSE, mostly_through
+from hybridreg.verdict.confidence import CLEAR, CLOSELY, LIKELY, SIZE_GAIN, SPARSE, mostly_through
 from hybridreg.verdict.doubts import Doubts
 
 Array = NDArray[np.float64]
@@ -86,6 +86,11 @@ def _against(
         )
     elif through_walls:
         yield f"free space is violated: the scanners saw through {evidence.looked_through_rare:.0%} of the walls"
+    if evidence.closely < CLOSELY:
+        yield (
+            f"the points lie hardly closer to the other cloud's surfaces than by chance ({evidence.closely:.2f} nats a "
+            f"point; {CLOSELY} and more where a pose is right)"
+        )
     k = int(np.argmin(agreement.shares))
     if agreement.shares[k] < AGREEMENT:
         yield _about_axis(agreement, k)

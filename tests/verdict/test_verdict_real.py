@@ -160,3 +160,16 @@ def test_a_right_pose_of_a_source_of_slightly_another_size_is_doubtful(
     assert result.verdict == "doubtful"
     assert "the source fits better when it is multiplied by" in " ".join(result.reasons)
     assert result.evidence["scale"] == pytest.approx(1.0 / factor, abs=0.003)
+
+
+def test_a_slice_that_lies_hardly_closer_than_by_chance_is_not_ok(real_data: Path) -> None:
+    name = "balm-os-50-to-20"
+    if not (real_data / name).is_dir():
+        pytest.skip(f"no pair {name}")
+    source, target = (
+        np.load(real_data / name / f"{side}.npz")["xyz"].astype(float) for side in ("source", "target")
+    )
+    source, target = (cloud[(cloud[:, 2] > -1.2) & (cloud[:, 2] < -0.2)] for cloud in (source, target))
+    result = hr.register(source, target)
+    off = Tolerance.between(truth_of(real_data, name), result.transformation, target.mean(axis=0))
+    assert off.within(VEHICLES) or result.verdict != "ok"
