@@ -91,7 +91,8 @@ def tiles(rng: np.random.Generator, seed: int) -> Sample:
     for side, share in ((1.0, shots[::2]), (-1.0, shots[1::2])):
         whole = merged(share, pose(0.0, 0.0, 0.0, 0.0))
         part = whole.kept(side * whole.points[:, across] < over)
-        frame = pose(*rng.uniform(-20.0, 20.0, 2), rng.uniform(-2.0, 0.0), rng.uniform(0.0, 360.0))
+        x, y = rng.uniform(-20.0, 20.0, 2)
+        frame = pose(x, y, rng.uniform(-2.0, 0.0), rng.uniform(0.0, 360.0))
         parts.append(thin(part.within(frame), rng.uniform(0.2, 0.3)))
     return judged(parts[0], parts[1], METRES, GRAIN)
 
