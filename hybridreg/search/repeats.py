@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from hybridreg.evidence.things import things
+from hybridreg.evidence.things import GROUND, things
 from hybridreg.evidence.views import Views
 from hybridreg.geometry import se3
 from hybridreg.search.moved_points import CHANCE, MovedPoints, peaks
@@ -35,10 +35,10 @@ _MOST = 4
 _APART = 2
 # The same of turns about a thing: when its near side has turned away, little of it is left; by hand.
 _OF_ROUND = 0.2
-# Cells over the ground from which a point belongs to a thing, cells between two, and how many are turned; by hand.
-_OFF_GROUND, _GAP, _THINGS = 1.5, 2.0, 2
-# Share of what stands on the ground that such a thing holds, at least: among many others a turn about one says nothing.
-_MOST_OF_IT = 0.5
+# Cells over the ground from which a point belongs to a thing, and cells between two; by hand.
+_OFF_GROUND, _GAP = 1.5, 2.0
+# Steps to the middle of a circle: half a per cent of its radius remains.
+_STEPS = 200
 # Fewest points that coincide at the pose itself, for a turn to be looked for; by hand.
 _AT_POSE = 10.0
 
@@ -86,19 +86,19 @@ class _Place(MovedPoints):
 
     def turned(self) -> Iterator[Array]:
         others = OccupiedCells(self.others[self.other_axis > 0], self.cell)
-        things = self.things[self.axis > 0]
+        own = self.things[self.axis > 0]
         for centre in self.centres:
-            yield from self._about(centre, things[: _POINTS // 3], others, _OF_ALL)
-        for centre, radius in self.round:
-            arms = things - centre
+            yield from self._about(centre, own[: _POINTS // 3], others, _OF_ALL)
+        if self.round is not None:
+            centre, radius = self.round
+            arms = own - centre
             within = np.linalg.norm(arms - np.outer(arms @ self.up, self.up), axis=1) < radius
-            if np.mean(within) > _MOST_OF_IT:
-                yield from self._about(centre, things[within], others, _OF_ROUND)
+            yield from self._about(centre, own[within], others, _OF_ROUND)
 
-    def _about(self, centre: Array, things: Array, others: OccupiedCells, least: float) -> Iterator[Array]:
+    def _about(self, centre: Array, own: Array, others: OccupiedCells, least: float) -> Iterator[Array]:
         degrees = np.concatenate([[0.0], np.arange(_FIRST_DEG, 360.0 - _FIRST_DEG, _ROUND_DEG)])
         turns = se3.rotation_about(np.radians(degrees)[:, None] * self.up)
-        moved = (things - centre) @ np.swapaxes(turns, 1, 2) + centre
+        moved = (own - centre) @ np.swapaxes(turns, 1, 2) + centre
         met = CHANCE + others.hold(moved).sum(axis=1)
         if met[0] < CHANCE + _AT_POSE:  # nothing coincides at the pose itself
             return
@@ -108,22 +108,35 @@ class _Place(MovedPoints):
             yield se3.about(centre, turns[k], np.zeros(3))
 
 
-def _round(points: Array, ground: NDArray[np.bool_], up: Array, cell: float) -> list[tuple[Array, float]]:
-    # Centre and radius of what may be round, like a gear or a wheel: the largest things off the ground, or the table.
-    import cv2
-
+def _round(points: Array, ground: NDArray[np.bool_], up: Array, cell: float) -> tuple[Array, float] | None:
+    # Centre and radius of what may be round, like a gear or a wheel: most of what stands on the ground, or the table.
+    if not ground.any():
+        return None
     level = np.cross(up, np.eye(3)[np.argmin(np.abs(up))])
-    frame = np.array([level / np.linalg.norm(level), np.cross(up, level / np.linalg.norm(level)), up])
+    level /= np.linalg.norm(level)
+    frame = np.array([level, np.cross(up, level), up])
     places = points @ frame.T
     heights = np.abs(places[:, 2] - np.median(places[ground, 2]))
     thing = things(places[:, :2], heights, _OFF_GROUND * cell, _GAP * cell)
-    found = []
-    for label in (np.argsort(-np.bincount(thing)[1:]) + 1)[:_THINGS]:
-        own = places[thing == label]
-        (x, y), radius = cv2.minEnclosingCircle((own[:, :2] - own[0, :2]).astype(np.float32))
-        middle = np.array([own[0, 0] + x, own[0, 1] + y, own[:, 2].mean()])
-        found.append((middle @ frame, float(radius) + cell))
-    return found
+    counts = np.bincount(thing)
+    counts[GROUND] = 0
+    if counts.max() <= counts.sum() / 2:
+        return None
+    own = places[thing == counts.argmax()]
+    middle, radius = _enclosing(own[:, :2])
+    return np.array([*middle, own[:, 2].mean()]) @ frame, radius + cell
+
+
+def _enclosing(places: Array) -> tuple[Array, float]:
+    # Middle and radius of the smallest circle around places (n, 2), nearly: by ever shorter steps to the farthest.
+    middle = places.mean(axis=0)
+    for step in range(1, _STEPS):
+        middle = middle + (places[_farthest(places, middle)] - middle) / (step + 1)
+    return middle, float(np.linalg.norm(places[_farthest(places, middle)] - middle))
+
+
+def _farthest(places: Array, middle: Array) -> int:
+    return int(np.argmax(np.sum((places - middle) ** 2, axis=1)))
 
 
 def _apart(places: Sequence[Array], least: float) -> list[Array]:
