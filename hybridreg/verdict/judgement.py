@@ -23,7 +23,7 @@ from hybridreg.scene import Scene
 from hybridreg.search import rivals, settle
 from hybridreg.search.hypothesis import Hypothesis, of_pose
 from hybridreg.search.ranking import best, differs, told_apart
-from hybridreg.verdict.confidence import CLEAR, DOUBTED, LIKELY, Word, confidence, word
+from hybridreg.verdict.confidence import CLEAR, CLOSELY, DOUBTED, LIKELY, Word, confidence, word
 from hybridreg.verdict.doubts import Doubts, is_right_but_for_size
 from hybridreg.verdict.words import reasons
 
@@ -156,7 +156,7 @@ def weigh(scene: Scene, pose: Pose) -> Weighed:
         doubts=doubts,
         drawn=drawn,
         confidence=probability,
-        undeformed=believed if doubts.about_source and not doubts.about_pose else probability,
+        undeformed=_undeformed(evidence) if doubts.about_source and not doubts.about_pose else probability,
     )
 
 
@@ -168,6 +168,11 @@ def _believed(
     if probability < FAILED and is_right_but_for_size(scene, at, evidence):
         probability = FAILED
     return probability, Doubts.about(scene, at, found, evidence, likely=probability >= FAILED)
+
+
+def _undeformed(evidence: Evidence) -> float:
+    # A source that is not deformed lies closely.
+    return confidence(replace(evidence, closely=max(evidence.closely, CLOSELY)))
 
 
 def _alone(scene: Scene, at: PoseEvidence, found_by: int = 1) -> Hypothesis:
