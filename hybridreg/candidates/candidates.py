@@ -94,18 +94,18 @@ class Candidates(Stage):
         likelier: list[Hypothesis] = []
         traces: list[EntryTrace] = []
         beyond: list[Hypothesis | Array] = []
-        pose, confidence, undeformed = Pose.unknown(len(matches)), 0.0, 0.0
+        pose = Pose.unknown(len(matches))
         for every in self._worth_trying(scene).stages(scene, matches, rng, traces, beyond):
             found = distinct(scene, [*(one for one in every if scene.pair.allows(one.T)), *likelier])
             if not found:
                 continue
-            pose, confidence, undeformed = as_pose(found), 0.0, 0.0
+            pose = as_pose(found)
             # To weigh a pose takes as long as to find some, and one that is rather wrong is not "ok".
             if found[0].log_odds > _LIKELY:
                 found, pose = self._weighed(scene, found, likelier)
-                confidence, undeformed = pose.weighed.confidence, pose.weighed.undeformed
-            if undeformed >= self.enough:
+            if _believed(pose)[1] >= self.enough:
                 break
+        confidence, undeformed = _believed(pose)
         with scene.clock.phase("verdict"):
             told = shut_out.explanations(scene, beyond, found, sure=confidence >= self.enough)
             # One that is deformed has its explanation.
@@ -207,6 +207,12 @@ class Candidates(Stage):
 
 # What the second look at all that was tried is called among the entries.
 _AGAIN = "second look"
+
+
+def _believed(pose: Pose) -> tuple[float, float]:
+    # The confidence, and what it would be if the source were not deformed; nothing before the pose is weighed.
+    weighed = pose.weighed
+    return (weighed.confidence, weighed.undeformed) if weighed else (0.0, 0.0)
 
 
 def _starts(scene: Scene, pose: Pose) -> list[Hypothesis | Array]:

@@ -108,6 +108,17 @@ class Agreement:
         return float(self.looked[1:].sum()), float(self.agreed[1:].sum()), float(self.through[1:].sum())
 
 
+def in_target(views: Views, agreement: Agreement) -> list[tuple[View, OneWay, Array, Array]]:
+    """Of either cloud the view, how its sampled points do under the pose, and these (m, 3) with their normals in the
+    target's frame."""
+    source, target = views.source, views.target
+    forth, back = agreement.source, agreement.target
+    return [
+        (source, forth, forth.moved, forth.normals),
+        (target, back, target.points[target.asked], target.normals[target.asked]),
+    ]
+
+
 def compare(views: Views, T_target_source: Array, stride: int = 1) -> Agreement:
     """Agreement under one pose (4, 4), from every `stride`-th of each cloud's sampled points."""
     return compare_each(views, T_target_source[None], stride)[0]

@@ -11,6 +11,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from hybridreg.evidence.agreement import in_target
 from hybridreg.evidence.pose_evidence import PoseEvidence
 from hybridreg.geometry import se3
 from hybridreg.geometry.ground_relief import TELLS
@@ -46,15 +47,14 @@ def bare_corner(at: PoseEvidence) -> bool:
         walls[k // 2, k % 2] = _on_plane(along[side == k, k // 2], _THICK * at.views.spacing)
     if len(points) - int(walls.sum()) > _FEW:
         return False
-    vertical = axes[0] if at.views.up is None else at.views.up
-    level = np.abs(axes @ vertical) < _LEVEL
+    level = np.abs(axes @ at.views.vertical(axes)) < _LEVEL
     one_sided = (walls > _WALL).sum(axis=1) == 1
     return bool((walls[level].sum(axis=1) > _HOLDS).all() and one_sided[level].any())
 
 
 def others_allowed(pair: Pair, at: PoseEvidence) -> bool:
     """Whether the pair's bounds allow a pose about as far away as one in another corner: a quarter turn or a half."""
-    vertical = at.agreement.axes[0] if at.views.up is None else at.views.up
+    vertical = at.views.vertical(at.agreement.axes)
     middle = se3.apply(at.T, at.views.middle)[0]
     turns = se3.rotation_about(0.5 * np.pi * np.arange(1, 4)[:, None] * vertical)
     return any(pair.allows(se3.about(middle, turn, np.zeros(3)) @ at.T) for turn in turns)
@@ -62,13 +62,9 @@ def others_allowed(pair: Pair, at: PoseEvidence) -> bool:
 
 def _agreeing(at: PoseEvidence) -> tuple[Array, Array]:
     # Points (n, 3) of both clouds that agree, in the target's frame, and their normals towards the sensors.
-    source, target = at.views.source, at.views.target
-    forth, back = at.agreement.source, at.agreement.target
+    centres = (se3.apply(at.T, at.views.source.centre[None])[0], at.views.target.centre)
     parts = []
-    for points, normals, way, centre in (
-        (forth.moved, forth.normals, forth, se3.apply(at.T, source.centre[None])[0]),
-        (target.points[target.asked], target.normals[target.asked], back, target.centre),
-    ):
+    for (_, way, points, normals), centre in zip(in_target(at.views, at.agreement), centres, strict=True):
         held = way.looked & way.agrees
         sight = np.einsum("ni,ni->n", centre - points[held], normals[held])
         parts.append((points[held], np.where(sight > 0.0, 1.0, -1.0)[:, None] * normals[held]))

@@ -13,7 +13,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from hybridreg.evidence.agreement import Agreement
+from hybridreg.evidence.agreement import Agreement, in_target
 from hybridreg.evidence.things import GROUND, things
 from hybridreg.evidence.views import View, Views
 
@@ -53,18 +53,9 @@ def held_along(views: Views, agreement: Agreement) -> Array | None:
     up = views.up
     if up is None or agreement.relief.information > _TELLS:
         return None
-    source, target = views.source, views.target
     rows = []
-    for view, way, points, facing, after in (
-        (source, agreement.source, agreement.source.moved, agreement.source.normals, 0),
-        (
-            target,
-            agreement.target,
-            target.points[target.asked],
-            target.normals[target.asked],
-            len(source.points),
-        ),
-    ):
+    for view, way, points, facing in in_target(views, agreement):
+        after = len(views.source.points) if view is views.target else 0
         thing = views.scene.shared(("things", after > 0), partial(_things, view))[view.asked]
         holds = way.looked & way.agrees & (thing != GROUND) & (np.abs(facing @ up) < _LEVEL)
         rows.append((points[holds], facing[holds], np.where(thing > 0, thing + after, _FIXED)[holds]))

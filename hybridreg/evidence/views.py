@@ -94,6 +94,10 @@ class Views:
             return None
         return self.target.ground.up
 
+    def vertical(self, axes: Array) -> Array:
+        """The vertical (3,), or where it is not known the commonest of the directions (3, 3) that surfaces face."""
+        return axes[0] if self.up is None else self.up
+
     @cached_property
     def fine(self) -> FineSurfaces:
         """Surfaces as fine as the clouds show them."""

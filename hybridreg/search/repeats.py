@@ -64,7 +64,7 @@ class _Place(MovedPoints):
         origin = np.zeros(3)
         own = se3.apply(T, np.array([views.source.centre, origin]))
         self.centres = _apart([*own, views.target.centre, origin], 2.0 * self.cell)
-        self.up = axes[0] if views.up is None else views.up
+        self.up = views.vertical(axes)
         self.round = _round(self.others, self.other_axis == 0, self.up, self.cell)
 
     def shifted(self) -> Iterator[Array]:
@@ -112,9 +112,7 @@ def _round(points: Array, ground: NDArray[np.bool_], up: Array, cell: float) -> 
     # Centre and radius of what may be round, like a gear or a wheel: most of what stands on the ground, or the table.
     if not ground.any():
         return None
-    level = np.cross(up, np.eye(3)[np.argmin(np.abs(up))])
-    level /= np.linalg.norm(level)
-    frame = np.array([level, np.cross(up, level), up])
+    frame = se3.turn_to_z(up)
     places = points @ frame.T
     heights = np.abs(places[:, 2] - np.median(places[ground, 2]))
     thing = things(places[:, :2], heights, _OFF_GROUND * cell, _GAP * cell)
