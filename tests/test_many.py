@@ -62,10 +62,9 @@ def test_a_prepared_target_gives_the_same_and_its_points_are_gone_through_once(
         gone_through.clear()
         target.register(scans[0])
         assert (len(world) not in gone_through) == again
-    for scan, pose in zip(scans, poses, strict=True):
-        independent = hr.register(scan, tmp_path / "map.ply", target_viewpoint="none")
-        assert near(target.register(scan).transformation, pose)
-        assert near(independent.transformation, pose)
+    independent = hr.register(scans[1], tmp_path / "map.ply", target_viewpoint="none")
+    assert near(target.register(scans[1]).transformation, poses[1])
+    assert near(independent.transformation, poses[1])
 
 
 def test_what_is_kept_changes_no_bit(town: Any) -> None:

@@ -48,45 +48,43 @@ def off(found: hr.Alignment, truth: np.ndarray) -> float:
     return float(np.linalg.norm(found.poses[:, :3, 3] - truth[:, :3, 3], axis=1).max())
 
 
-def test_a_tour_of_twelve_scans_survives_a_wrong_link() -> None:
-    scans, truth = tour(12, length=30.0)
-    wrong = se3.inverse(truth[9]) @ truth[10] @ se3.from_rt(np.eye(3), np.array([4.0, 2.0, 0.0]))
-    found = hr.register_all(scans, known={(10, 9): wrong})
+def test_a_tour_of_eight_scans_survives_a_wrong_link() -> None:
+    scans, truth = tour(8, length=20.0)
+    wrong = se3.inverse(truth[5]) @ truth[6] @ se3.from_rt(np.eye(3), np.array([4.0, 2.0, 0.0]))
+    found = hr.register_all(scans, known={(6, 5): wrong})
     assert found.verdict == "ok", found.summary()
     assert off(found, truth) < 0.1
-    assert [(link.source, link.target) for link in found.links if link.role == "contradicts"] == [(10, 9)]
-    assert any("cloud 10 -> cloud 9 (given) contradicts" in reason for reason in found.reasons)
-    assert "cloud 10 -> cloud 9" in found.summary()
+    assert [(link.source, link.target) for link in found.links if link.role == "contradicts"] == [(6, 5)]
+    assert any("cloud 6 -> cloud 5 (given) contradicts" in reason for reason in found.reasons)
+    assert "cloud 6 -> cloud 5" in found.summary()
     told = json.loads(json.dumps(found.to_dict()))
-    np.testing.assert_allclose(told["poses"]["cloud 11"], found.poses[11])
+    np.testing.assert_allclose(told["poses"]["cloud 7"], found.poses[7])
 
 
-def test_shuffled_scans_another_reference_and_workers() -> None:
-    scans, truth = tour(5, length=15.0)
-    order = [3, 0, 4, 1, 2]
+def test_shuffled_scans_and_another_reference() -> None:
+    scans, truth = tour(4, length=12.0)
+    order = [3, 0, 1, 2]
     shuffled = [scans[k] for k in order]
     found = hr.register_all(shuffled, ordered=False, reference=2, names=[f"s{k}" for k in order])
-    wanted = se3.inverse(truth[4]) @ truth[order]
+    wanted = se3.inverse(truth[1]) @ truth[order]
     assert found.placed.all(), found.summary()
     assert off(found, wanted) < 0.1
     np.testing.assert_array_equal(found.poses[2], np.eye(4))
-    again = hr.register_all(shuffled, ordered=False, reference=2, workers=2)
-    np.testing.assert_array_equal(found.poses, again.poses)
 
 
 def test_a_cloud_of_another_place_is_left_out_by_name() -> None:
-    scans, truth = tour(4, length=12.0)
+    scans, truth = tour(3, length=9.0)
     elsewhere = box_world.scan(
         box_world.wood(np.random.default_rng(3)),
         "rings32",
         box_world.sensor_pose(0, 0, 1.8, 0),
         np.random.default_rng(4),
     )
-    found = hr.register_all([*scans[:2], elsewhere, *scans[2:]], names=["a", "b", "lost", "c", "d"])
-    assert found.placed.tolist() == [True, True, False, True, True], found.summary()
+    found = hr.register_all([*scans[:2], elsewhere, scans[2]], names=["a", "b", "lost", "c"])
+    assert found.placed.tolist() == [True, True, False, True], found.summary()
     assert found.verdict == "doubtful"
     assert any(reason.startswith("lost is not placed") for reason in found.reasons)
-    assert off_of(found, [0, 1, 3, 4], truth) < 0.1
+    assert off_of(found, [0, 1, 3], truth) < 0.1
 
 
 def off_of(found: hr.Alignment, rows: list[int], truth: np.ndarray) -> float:

@@ -32,7 +32,7 @@ def test_scans_of_one_room_are_right_and_ok(seed: int) -> None:
     assert result.transformation[2, 2] > np.cos(np.radians(0.5))
 
 
-@pytest.mark.parametrize(("here", "there"), [(400, 418), (534, 536), (608, 610)])
+@pytest.mark.parametrize(("here", "there"), [(400, 418), (534, 536)])
 def test_scans_of_different_rooms_are_not_ok(here: int, there: int) -> None:
     assert hr.register(sample("flat", here).source, sample("flat", there).target).verdict != "ok"
 

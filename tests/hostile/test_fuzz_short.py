@@ -36,10 +36,10 @@ class Bad:
         return "fine"
 
 
-def test_two_hundred_inputs_make_no_finding() -> None:
-    report = campaign.run(200, start=7)
+def test_a_few_inputs_of_each_kind_make_no_finding() -> None:
+    report = campaign.run(140, start=7)
     assert [(name, text, case) for name, case, text in report.findings] == []
-    assert sum(report.counts.values()) > 190
+    assert sum(report.counts.values()) > 130
     for name in campaign.SHARES:  # nothing may be refused altogether, or it tests the gate alone
         assert name == "paths" or report.counts[name, "fine"] > 0
 

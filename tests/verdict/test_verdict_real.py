@@ -86,15 +86,14 @@ def _gaps(scene: Scene, T: np.ndarray) -> np.ndarray:
     return target.tree.query(se3.apply(T, source.points), distance_upper_bound=0.5)[0]
 
 
-@pytest.mark.parametrize("factors", [0.94, np.array([1.0, 0.93, 1.0])])
 def test_a_source_of_another_size_is_not_ok_though_the_relief_of_the_ground_fits(
-    real_data: Path, factors: float | np.ndarray
+    real_data: Path,
 ) -> None:
     name = "kitti-city-20-to-0"
     if not (real_data / name).is_dir():
         pytest.skip(f"no pair {name}")
     source, target = (np.load(real_data / name / f"{side}.npz")["xyz"] for side in ("source", "target"))
-    result = hr.register(se3.apply(se3.yaw(40.0), source.astype(float)) * factors, target)
+    result = hr.register(se3.apply(se3.yaw(40.0), source.astype(float)) * 0.94, target)
     assert result.verdict != "ok"
     assert "free space is violated" in " ".join(result.reasons)
 
@@ -105,8 +104,7 @@ def test_a_source_of_another_size_is_not_ok_though_the_relief_of_the_ground_fits
         (0.0, (20.0, 0.0, 0.0)),
         (0.0, (0.0, 0.0, 3.0)),
         # Nearer than two answers to the search: a map that was built badly.
-        (0.0, (1.0, 1.0, 0.0)),
-        (3.0, (0.0, 0.0, 0.0)),
+        (3.0, (1.0, 1.0, 0.0)),
     ],
 )
 def test_a_map_that_holds_the_place_twice_shows_both(
