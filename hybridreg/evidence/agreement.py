@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybridreg.evidence.orientation import overturned
+from hybridreg.evidence.relief_repeats import beyond
 from hybridreg.evidence.views import View, Views
 from hybridreg.geometry import se3
 from hybridreg.geometry.ground_relief import Alike, alike
@@ -38,6 +39,8 @@ _REACH = 1.0
 _SAME_NORMAL = float(np.cos(np.radians(45.0)))
 # Points added to every count of visible ones: so few agreeing points are a coincidence; by hand.
 PSEUDO_COUNT = 20.0
+# Nats up to which a relief hardly speaks for a pose, and it does not matter whether it repeats; by hand.
+_SPEAKS = 5.0
 # Without a range image a point counts as visible where the other cloud has any point within so many spacings; by hand.
 _SURROUNDED = 6.0
 
@@ -77,7 +80,7 @@ class Agreement:
     looked, agreed, through : (3,) float64, points that face each axis: visible to the other sensor, agreeing, and
         violating free space; both clouds together
     relief : Alike
-        How well the ground relief of both clouds correlates.
+        How well the ground relief of both clouds correlates, beyond what it repeats.
     overturned : bool
         The world is upside down, or a sensor stands below the other's ground.
     """
@@ -149,11 +152,16 @@ def compare_each(views: Views, poses: Array, stride: int = 1) -> list[Agreement]
             looked=stride * looked[row],
             agreed=stride * agreed[row],
             through=stride * through[row],
-            relief=alike(source.relief, target.relief, T, stride),
+            relief=_relief(views, T, stride),
             overturned=overturned(source, target, T),
         )
         for row, T in enumerate(poses)
     ]
+
+
+def _relief(views: Views, T: Array, stride: int) -> Alike:
+    found = alike(views.source.relief, views.target.relief, T, stride)
+    return beyond(found, views.relief_repeats) if found.information > _SPEAKS else found
 
 
 def one_way(a: View, rows: NDArray[np.int64], b: View, T_b_a: Array, spacing: float) -> OneWay:

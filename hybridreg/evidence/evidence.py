@@ -39,7 +39,7 @@ class Evidence:
     agreed_rare: float  # how many of these agree
     through_rare: float  # how many violate free space
     relief_cells: float  # cells of ground that both clouds show
-    relief_correlation: float  # of their heights, between -1 and 1
+    relief_correlation: float  # of their heights, beyond what repeats, between -1 and 1
     weakest: float  # smallest eigenvalue of the information per point, at most 1/3
     found_by: float  # entries that found the pose independently of one another
     matched: float  # largest agreeing share of any matcher's matches; 0 where none ran

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from hybridreg.cloud import PointCloud
+from hybridreg.evidence.relief_repeats import repeats
 from hybridreg.evidence.surface_distance import FineSurfaces
 from hybridreg.geometry import ground, normals
 from hybridreg.geometry.ground import Ground
@@ -102,6 +103,12 @@ class Views:
     def fine(self) -> FineSurfaces:
         """Surfaces as fine as the clouds show them."""
         return FineSurfaces.of(self.scene.pair)
+
+    @cached_property
+    def relief_repeats(self) -> float:
+        """How much the ground's relief is like itself elsewhere, of the cloud in which it is so most; a correlation."""
+        reliefs = (view.relief for view in (self.source, self.target))
+        return max((repeats(relief) for relief in reliefs if relief is not None), default=0.0)
 
     @cached_property
     def middle(self) -> Array:
