@@ -50,10 +50,11 @@ _ALL, _NONE, _HELD, _SEEN = 0.85, 0.01, 0.005, 0.3
 # some 30 right poses on fields and in maps (`sim:val/degenerate`, hard kinds with even seeds) 0.39 or more of the
 # points agree that do not face the commonest axis; of a wrong one on made relief, half a turn off, 0.01.
 _HARDLY, _FACING = 0.1, 60
-# Agreeing share of all that does not face the commonest axis below which the relief alone makes no "ok"; by hand.
-# Of 99 right poses that relief speaks for (real, `sim:val`, hard kinds with even seeds, with and without viewpoints)
-# none has less than 0.33; of eight wrong ones, on ground whose waves repeat, none more than 0.22.
-_FEW = 0.25
+# Agreeing share of all that does not face the commonest axis below which the relief alone makes no "ok" where some
+# points face the rarest; by hand. Of 99 right poses that relief speaks for (real, `sim:val`, hard kinds with even
+# seeds, with and without viewpoints) none has less than 0.33; of nine wrong ones, on ground whose waves repeat, none
+# more than 0.22.
+_FEW, _SOME = 0.25, 30
 # Log-odds by which a rival may be likelier and still count as equal; by hand.
 _EQUAL = 1.0
 # Log-odds from which a rival is told of, however far it lies behind: a map may hold a place twice.
@@ -123,10 +124,10 @@ def _nothing_against(evidence: Evidence) -> bool:
 
 def _but_for_the_ground(evidence: Evidence) -> bool:
     # Both rarer axes contradict the pose, and only the ground agrees, with its relief: that may repeat.
-    if evidence.looked_least <= _FACING:
-        return False
+    if evidence.looked_least > _FACING and evidence.agreement_middle < _HARDLY:
+        return True
     told = float(nats(evidence.relief_cells, evidence.relief_correlation)) > TELLS
-    return evidence.agreement_middle < _HARDLY or (told and evidence.agreement_rare < _FEW)
+    return told and evidence.looked_least > _SOME and evidence.agreement_rare < _FEW
 
 
 def mostly_through(evidence: Evidence) -> bool:

@@ -175,8 +175,16 @@ def test_a_pair_turned_round_has_the_same_support_and_confidence(evidence: Evide
     assert features(round_about) == features(evidence)
 
 
-@pytest.mark.parametrize(("kind", "seed"), [("merged", 453), ("tiles", 468), ("tiles", 464)])
-def test_relief_alone_makes_no_pose_ok_that_walls_contradict(kind: str, seed: int) -> None:
+@given(whole, st.floats(31.0, 3000.0), st.floats(0.0, 0.249))
+def test_relief_alone_makes_no_pose_ok_that_walls_contradict(
+    evidence: Evidence, looked: float, agreed: float
+) -> None:
+    on_waves = replace(evidence, relief_cells=955.0, relief_correlation=0.7, looked_least=looked)
+    assert word(confidence(replace(on_waves, agreement_rare=agreed))) != "ok"
+
+
+@pytest.mark.parametrize(("kind", "seed"), [("tiles", 468)])
+def test_nor_where_it_is_the_likeliest(kind: str, seed: int) -> None:
     made = sample(kind, seed)  # half a turn off the ground's waves fit
     result = hr.register(made.source, made.target)
     assert is_right(made, result.transformation) or result.verdict != "ok"
