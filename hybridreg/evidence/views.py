@@ -13,7 +13,7 @@ from scipy.spatial import cKDTree
 from hybridreg.cloud import PointCloud
 from hybridreg.evidence.relief_repeats import repeats
 from hybridreg.evidence.surface_distance import FineSurfaces
-from hybridreg.geometry import ground, normals
+from hybridreg.geometry import ground, normals, se3
 from hybridreg.geometry.ground import Ground
 from hybridreg.geometry.ground_relief import Relief
 from hybridreg.geometry.main_axes import balanced
@@ -31,6 +31,9 @@ _NEAR_ENOUGH = 1.5
 _MOST_POINTS = 20_000
 # Points that are sampled evenly for comparison: a share of 3,000 is good to one percent.
 _N_ASKED = 3_000
+
+# Distance between two sensors that stand at one place, of the median range of the target's points, at most; by hand.
+_ONE_PLACE = 0.1
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -94,6 +97,14 @@ class Views:
         if self.source.ground is None or self.target.ground is None:
             return None
         return self.target.ground.up
+
+    def from_one_place(self, T_target_source: Array) -> bool:
+        """Whether a pose (4, 4) puts the sensors of both clouds, where it is known where they stood, at one place."""
+        if self.source.image is None or self.target.image is None:
+            return False
+        apart = se3.apply(T_target_source, self.source.centre[None])[0] - self.target.centre
+        ranges = np.linalg.norm(self.target.points[self.target.asked] - self.target.centre, axis=1)
+        return bool(np.linalg.norm(apart) < _ONE_PLACE * np.median(ranges))
 
     def vertical(self, axes: Array) -> Array:
         """The vertical (3,), or where it is not known the commonest of the directions (3, 3) that surfaces face."""

@@ -29,6 +29,8 @@ _ROUND_DEG, _FIRST_DEG = 2.0, 6.0
 _POINTS = 400
 # Share of the points that coincide at the pose which must coincide elsewhere, of either kind, and of all; by hand.
 _SHARE, _OF_ALL = 0.25, 0.4
+# The same share where the pose lets both clouds be seen from one place, and more coincides than at any other; by hand.
+_SHARE_OF_ONE_PLACE = 0.1
 # Copies of each kind returned, at most; by hand.
 _MOST = 4
 # Cells, or turns, between two of them, at least; by hand.
@@ -65,6 +67,7 @@ class _Place(MovedPoints):
         own = se3.apply(T, np.array([views.source.centre, origin]))
         self.centres = _apart([*own, views.target.centre, origin], 2.0 * self.cell)
         self.up = views.vertical(axes)
+        self.least = _SHARE_OF_ONE_PLACE if views.from_one_place(T) else _SHARE
         self.round = _round(self.others, self.other_axis == 0, self.up, self.cell)
 
     def shifted(self) -> Iterator[Array]:
@@ -74,14 +77,14 @@ class _Place(MovedPoints):
         turns = [se3.rotation_about(np.radians(deg) * self.axes[0]) for deg in _TURNS_DEG]
         share = self.share((1, 2), frame, middle, turns, reach)
         best, turn = share.max(axis=0), share.argmax(axis=0)
-        for i, j in _peaks(best):
+        for i, j in _peaks(best, self.least):
             shift = self.cell * np.array([i - reach[0], j - reach[1], 0]) @ frame
             yield se3.about(middle, turns[turn[i, j]], shift)
 
     def raised(self) -> Iterator[Array]:
         middle = self.things.mean(axis=0)
         share = self.share((0, 1, 2), self.axes[[1, 0, 2]], middle, [np.eye(3)], (0, _ALONG))[0]
-        for _, j in _peaks(share):
+        for _, j in _peaks(share, self.least):
             yield se3.from_rt(np.eye(3), self.cell * (j - _ALONG) * self.axes[0])
 
     def turned(self) -> Iterator[Array]:
@@ -104,7 +107,7 @@ class _Place(MovedPoints):
             return
         share = np.where(met >= least * met[0], met / met[0], 0.0)
         share[0] = 0.0
-        for _, k in _peaks(share[None], centre=False):
+        for _, k in _peaks(share[None], _SHARE, centre=False):
             yield se3.about(centre, turns[k], np.zeros(3))
 
 
@@ -145,12 +148,12 @@ def _apart(places: Sequence[Array], least: float) -> list[Array]:
     return kept
 
 
-def _peaks(share: Array, *, centre: bool = True) -> list[tuple[int, int]]:
+def _peaks(share: Array, least: float, *, centre: bool = True) -> list[tuple[int, int]]:
     # The fullest; without the pose itself, where it is at the centre.
     middle = np.array(share.shape) // 2
     found = [
         (i, j)
-        for i, j in peaks(share, 2 * _APART + 1, _SHARE)
+        for i, j in peaks(share, 2 * _APART + 1, least)
         if not centre or max(abs(i - middle[0]), abs(j - middle[1])) > _APART
     ]
     return found[:_MOST]

@@ -29,7 +29,8 @@ _OVERTURNED = 0.3
 DOUBTED = 0.9
 # Nats per point from which it fits better at another scale: of some 400 right training poses none gained 0.08.
 SIZE_GAIN = 0.12
-# Of sparse clouds, points that agree off the commonest surface before a pose is "ok": chance makes a handful agree.
+# Points that agree off the commonest surface before a pose is "ok", where its relief does not tell or the clouds are
+# sparse: chance makes a handful agree.
 SPARSE, _AGREE = 1000, 20
 # Nats per point by which the points lie closer to the surfaces than by chance, from which a pose is "ok": by hand. Of
 # 426 right poses (real, `sim:val`, hard kinds with even seeds) none has less than 0.41; a slice a metre thick that was
@@ -104,8 +105,7 @@ def confidence(evidence: Evidence, rule: Boosted | None = None) -> float:
     if evidence.overturned:
         return min(probability, _OVERTURNED)
     resized, close = told["size_gain"] > SIZE_GAIN, told["rival_margin"] > -CLEAR
-    by_chance = evidence.compared < SPARSE and evidence.agreed_rare < _AGREE
-    bounded = resized or close or by_chance or evidence.closely < CLOSELY
+    bounded = resized or close or on_one_surface(evidence) or evidence.closely < CLOSELY
     bounded = bounded or mostly_through(evidence) or _but_for_the_ground(evidence)
     return min(probability, DOUBTED) if bounded else probability
 
@@ -122,12 +122,20 @@ def _nothing_against(evidence: Evidence) -> bool:
     )
 
 
+def on_one_surface(evidence: Evidence) -> bool:
+    """Whether nothing but the commonest surface agrees, and that has no relief to tell one place on it from another."""
+    return evidence.agreed_rare < _AGREE and (evidence.compared < SPARSE or not _relief_tells(evidence))
+
+
+def _relief_tells(evidence: Evidence) -> bool:
+    return float(nats(evidence.relief_cells, evidence.relief_correlation)) > TELLS
+
+
 def _but_for_the_ground(evidence: Evidence) -> bool:
     # Both rarer axes contradict the pose, and only the ground agrees, with its relief: that may repeat.
     if evidence.looked_least > _FACING and evidence.agreement_middle < _HARDLY:
         return True
-    told = float(nats(evidence.relief_cells, evidence.relief_correlation)) > TELLS
-    return told and evidence.looked_least > _SOME and evidence.agreement_rare < _FEW
+    return _relief_tells(evidence) and evidence.looked_least > _SOME and evidence.agreement_rare < _FEW
 
 
 def mostly_through(evidence: Evidence) -> bool:

@@ -14,7 +14,15 @@ from hybridreg.evidence.information import Information
 from hybridreg.evidence.range_offset import RangeOffset
 from hybridreg.evidence.stretch import Stretch
 from hybridreg.resolution import Tolerance
-from hybridreg.verdict.confidence import CLEAR, CLOSELY, LIKELY, SIZE_GAIN, SPARSE, mostly_through
+from hybridreg.verdict.confidence import (
+    CLEAR,
+    CLOSELY,
+    LIKELY,
+    SIZE_GAIN,
+    SPARSE,
+    mostly_through,
+    on_one_surface,
+)
 from hybridreg.verdict.doubts import Doubts
 
 Array = NDArray[np.float64]
@@ -63,6 +71,7 @@ def reasons(
         *_against(evidence, agreement, held, doubts.through_walls),
         *_from_one_side(doubts.lone_thing),
         *_in_a_corner(doubts.corner),
+        *_from_one_place(doubts.one_place),
         *_inexact(doubts.slack),
         *_unknown(unseen),
     )
@@ -90,6 +99,11 @@ def _against(
         yield (
             f"the points lie hardly closer to the other cloud's surfaces than by chance ({evidence.closely:.2f} nats a "
             f"point; {CLOSELY} and more where a pose is right)"
+        )
+    if on_one_surface(evidence):
+        yield (
+            "nothing agrees but one surface, and it has no relief that tells one place on it from another: the pose "
+            "may slide along it"
         )
     k = int(np.argmin(agreement.shares))
     if agreement.shares[k] < AGREEMENT:
@@ -179,6 +193,22 @@ def _in_a_corner(corner: bool) -> Iterator[str]:
             "nothing agrees but the walls and the floor of one corner, and other corners look alike; what stands in "
             "it, or both ends of a wall, would tell. A rough start excludes the others: init=T, max_rotation=45 "
             "(--init POSE --max-rotation 45)"
+        )
+
+
+def _from_one_place(rival: Tolerance | None) -> Iterator[str]:
+    if rival is not None:
+        half = f"{0.5 * rival.metres:.1g}"
+        bound, option = (
+            ("max_rotation=45", "--max-rotation 45")
+            if rival.degrees > 90.0
+            else (f"max_translation={half}", f"--max-translation {half}")
+        )
+        yield (
+            "by this pose both clouds were seen from nearly one place, and there sensors hit the same spots of any "
+            f"place that looks alike; little contradicts another pose, {rival.degrees:.0f} deg and {rival.metres:.2g} "
+            f"m away (see rivals): does the place repeat? A start tells which it is: init=T, {bound} (--init POSE "
+            f"{option})"
         )
 
 
