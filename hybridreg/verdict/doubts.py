@@ -19,8 +19,8 @@ from hybridreg.geometry.ground_relief import TELLS
 from hybridreg.resolution import Tolerance, tolerance
 from hybridreg.scene import Scene
 from hybridreg.search.hypothesis import Hypothesis
-from hybridreg.verdict import one_place
 from hybridreg.verdict.confidence import SIZE_GAIN, confidence
+from hybridreg.verdict.one_place import Rivalled, rivalled
 
 Array = NDArray[np.float64]
 
@@ -51,8 +51,8 @@ class Doubts:
         One thing is seen from one side, and nothing known beforehand excludes the opposite side.
     corner : bool
         Nothing agrees but the planes of one corner of a room, and nothing known beforehand excludes another.
-    one_place : Tolerance or None
-        How far the nearest rival lies that little contradicts, where by the pose both clouds were seen from one place.
+    one_place : Rivalled or None
+        Rivals that little contradicts, where by the pose both clouds were seen from one place.
     stretch : Stretch or None
         How the source fits better.
     range_offset : RangeOffset or None
@@ -66,7 +66,7 @@ class Doubts:
     alike: bool
     lone_thing: bool = False
     corner: bool = False
-    one_place: Tolerance | None = None
+    one_place: Rivalled | None = None
     stretch: Stretch | None = None
     range_offset: RangeOffset | None = None
     traffic: Array | None = None
@@ -103,7 +103,7 @@ class Doubts:
         return replace(
             quick,
             lone_thing=opposite is not None and scene.pair.allows(opposite),
-            one_place=one_place.nearest_rival(at, found),
+            one_place=rivalled(at, found),
             corner=corner.bare_corner(at) and corner.others_allowed(scene.pair, at),
             stretch=at.stretch,
             range_offset=offset if offset is not None and offset.told and not strained else None,

@@ -125,7 +125,7 @@ def judge(scene: Scene, pose: Pose, matches: Correspondences) -> Judgement:
         overlay=Overlay(scene.pair.source.points, scene.pair.target.points, pose.T, 2.0 * scene.spacing),
         information=weighed.at.information.matrix,
         centre=weighed.at.information.centre,
-        rivals=_close(weighed.rivals, evidence.support),
+        rivals=_close(weighed),
     )
 
 
@@ -258,7 +258,10 @@ def _unseen(scene: Scene) -> dict[str, str]:
     return {name: cloud.seen.words for name, cloud in clouds.items() if cloud.viewpoint is None}
 
 
-def _close(found: list[Hypothesis], support: float) -> Array:
-    # Those that do nearly as well, and those that would be likely if the pose were not known.
-    told = min(support - CLEAR, LIKELY)
-    return np.array([rival.T for rival in found if rival.log_odds > told]).reshape(-1, 4, 4)
+def _close(weighed: Weighed) -> Array:
+    # Those that do nearly as well, those that would be likely if the pose were not known, and those that leave it in
+    # doubt.
+    told, doubted = min(weighed.evidence.support - CLEAR, LIKELY), weighed.doubts.one_place
+    told_of = [] if doubted is None else [T.tobytes() for T in doubted.rivals]
+    close = [one.T for one in weighed.rivals if one.log_odds > told or one.T.tobytes() in told_of]
+    return np.array(close).reshape(-1, 4, 4)

@@ -8,10 +8,17 @@ beside such a pose a rival need not explain the clouds nearly as well; it is eno
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
 from hybridreg.evidence.pose_evidence import PoseEvidence
 from hybridreg.geometry import se3
 from hybridreg.resolution import Tolerance
 from hybridreg.search.hypothesis import Hypothesis
+
+Array = NDArray[np.float64]
 
 # Of a rival: points off the commonest surface that agree, at least; those that are seen through, as a share of these,
 # and all that are seen through, as a share of the visible, at most; nats per point closer than by chance, at least. By
@@ -19,14 +26,23 @@ from hybridreg.search.hypothesis import Hypothesis
 _AGREE, _THROUGH_RARE, _THROUGH, _CLOSELY = 60, 0.65, 0.1, 0.4
 
 
-def nearest_rival(at: PoseEvidence, found: list[Hypothesis]) -> Tolerance | None:
-    """How far the nearest of the rivals lies that little contradicts; None where there is none, or the pose does not
-    let both clouds be seen from one place."""
+class Rivalled(NamedTuple):
+    """The `rivals` (r, 4, 4) of such a pose that little contradicts, and how far the nearest of them lies."""
+
+    rivals: Array
+    nearest: Tolerance
+
+
+def rivalled(at: PoseEvidence, found: list[Hypothesis]) -> Rivalled | None:
+    """None where no rival counts, or the pose does not let both clouds be seen from one place."""
     if not at.views.from_one_place(at.T):
         return None
+    counts = [one.T for one in found if _uncontradicted(one.at)]
+    if not counts:
+        return None
     centre = se3.apply(at.T, at.views.middle)[0]
-    away = (Tolerance.between(at.T, one.T, centre) for one in found if _uncontradicted(one.at))
-    return min(away, key=lambda off: off.metres, default=None)
+    nearest = min((Tolerance.between(at.T, T, centre) for T in counts), key=lambda off: off.metres)
+    return Rivalled(np.array(counts), nearest)
 
 
 def _uncontradicted(at: PoseEvidence) -> bool:

@@ -24,6 +24,7 @@ from hybridreg.verdict.confidence import (
     on_one_surface,
 )
 from hybridreg.verdict.doubts import Doubts
+from hybridreg.verdict.one_place import Rivalled
 
 Array = NDArray[np.float64]
 
@@ -196,8 +197,9 @@ def _in_a_corner(corner: bool) -> Iterator[str]:
         )
 
 
-def _from_one_place(rival: Tolerance | None) -> Iterator[str]:
-    if rival is not None:
+def _from_one_place(rivalled: Rivalled | None) -> Iterator[str]:
+    if rivalled is not None:
+        rival = rivalled.nearest
         half = f"{0.5 * rival.metres:.1g}"
         bound, option = (
             ("max_rotation=45", "--max-rotation 45")

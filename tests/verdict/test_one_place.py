@@ -69,6 +69,7 @@ def test_the_reason_says_so_and_what_it_names_settles_it() -> None:
     assert result.verdict == "doubtful"
     told = re.search(r"seen from nearly one place.*max_translation=([\d.]+)", " ".join(result.reasons))
     assert told, result.reasons
+    assert len(result.rivals)  # which the reason points to
     started = hr.register(source, target, init=made.truth, max_translation=float(told[1]))
     assert started.verdict == "ok", started.reasons
     assert apart(started.transformation, made.truth) < 0.1
