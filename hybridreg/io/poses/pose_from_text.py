@@ -18,7 +18,8 @@ Array = NDArray[np.float64]
 
 _COMMENTS = ("#", "//", "%")
 _ORIGIN = re.compile(r"<origin\b([^>]*)>")
-_NUMBERS = re.compile(r"\d|\bnan\b", re.IGNORECASE)
+# A row has numbers of its own, not only names that end in one, such as `q0`.
+_NUMBERS = re.compile(r"(?<![\w.])[-+]?\.?\d|\bnan\b", re.IGNORECASE)
 _BRACKETS = str.maketrans("[](){}", "      ")
 
 

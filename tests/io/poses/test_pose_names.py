@@ -42,16 +42,39 @@ EUROC = (
         f"%time x y z ori_w ori_x ori_y ori_z\n0 {T} {WXYZ}",
         f"# x [m], y [m], z [m], qw [], qx [], qy [], qz []\n{T} {WXYZ}",
         f"# x y z qw qx qy qz (metres, map)\n{T} {WXYZ}",
+        # Other names of the parts, and words that name no column but the order.
+        f"x y z qr qi qj qk\n{T} {WXYZ}",
+        f"tx ty tz qs qx qy qz\n{T} {WXYZ}",
+        f"# x y z real i j k\n{T} {WXYZ}",
+        f"# tx,ty,tz,q_i,q_j,q_k,q_r\n{T} {Q}",
+        f"# position (x, y, z), quaternion (w, x, y, z)\n{T} {WXYZ}",
+        f"# position and quaternion, scalar first\n{T} {WXYZ}",
+        f"# time xyz wxyz\n0 {T} {WXYZ}",
+        f"# x y z w x y z\n{T} {WXYZ}",
         # Names that do not say which columns these are leave what seven numbers are without names.
-        f"# x y z w x y z\n{T} {Q}",
+        f"# xyz xyzw, scalar last\n{T} {Q}",
         f"# from the source to the target, seven numbers\n{T} {Q}",
-        f"# x y z q1 q2 q3 q4\n{T} {Q}",
     ],
 )
 def test_names_of_the_columns_say_where_w_stands(tmp_path: Path, text: str) -> None:
     # Read as x y z w they gave another rotation, without a word.
     path = tmp_path / "pose.txt"
     path.write_text(text)
+    np.testing.assert_allclose(read_pose(path), POSE, rtol=0, atol=1e-14)
+
+
+@pytest.mark.parametrize(
+    "names", ["# x y z q1 q2 q3 q4", "x,y,z,q0,q1,q2,q3", "% time x y z quat_0 quat_1 quat_2 quat_3"]
+)
+def test_counted_parts_of_a_quaternion_are_refused(tmp_path: Path, names: str) -> None:
+    # Robots of ABB and autopilots have w first, others last: read as w last they gave another rotation.
+    path = tmp_path / "pose.txt"
+    path.write_text(f"{names}\n{'0 ' if 'time' in names else ''}{T} {WXYZ}\n")
+    with pytest.raises(
+        ValueError, match="do not say which part of the quaternion is w; call them x y z qx qy qz qw"
+    ):
+        read_pose(path)
+    path.write_text(f"# x y z qw qx qy qz\n{T} {WXYZ}\n")
     np.testing.assert_allclose(read_pose(path), POSE, rtol=0, atol=1e-14)
 
 
