@@ -15,6 +15,7 @@ from hybridreg.io.column_names import axes_in, find_axes
 from hybridreg.io.coordinate_systems.length_unit import in_metres
 from hybridreg.io.faults import fault, shorten
 from hybridreg.io.meaning.beside_points import changes_points, with_what_is_beside
+from hybridreg.io.meaning.downward import tell_downward
 from hybridreg.io.meaning.first_column import FEWEST
 from hybridreg.io.meaning.image_shapes import refuse_image
 from hybridreg.io.meaning.length_units import one_unit, unit_given
@@ -70,6 +71,7 @@ def points(x: Any, names: list[Any], name: str) -> Array:
         raise fault(name, f"x, y and z have the lengths {lengths}", "give them equally long")
     if all(np.array_equal(column, np.round(column)) for column in columns):
         refuse_raw_las(told, name)
+    tell_downward(_attributes(_column(x, axes.columns[2], names)).get("positive"), name)
     metres = axes.metres if axes.metres is not None else _unit(x, axes.columns, names, name)
     points = with_what_is_beside(stack_axes(*columns), beside(x, names, axes.columns), name)
     return in_metres(points, metres, name)
@@ -101,11 +103,13 @@ def beside(x: Any, names: list[Any], columns: Iterable[int] = ()) -> dict[str, A
 
 def attributes_beside(x: Any) -> dict[str, Any]:
     """Those attributes of an object that may change its points."""
+    return {str(key): value for key, value in _attributes(x).items() if changes_points(key)}
+
+
+def _attributes(x: Any) -> Mapping[Any, Any]:
     # As NetCDF and HDF5 keep them: xarray's and h5py's; pandas has them too.
     attributes = getattr(x, "attrs", None)
-    if not isinstance(attributes, Mapping):
-        return {}
-    return {str(key): value for key, value in attributes.items() if changes_points(key)}
+    return attributes if isinstance(attributes, Mapping) else {}
 
 
 def _unit(x: Any, columns: tuple[int, int, int], names: list[Any], name: str) -> float | None:
