@@ -16,7 +16,7 @@ _AXES = ("x", "y", "z")
 # What tools put before or behind an axis: ROS, E57, ParaView, spreadsheets. Not `n` or `v`: normals and velocities.
 _AFFIXES = (
     "point", "points", "pos", "position", "coord", "coords", "coordinate", "cartesian", "p", "xyz", "lidar", "velo",
-    "sensor", "loc", "location", "points_m_xyz", "first", "1",
+    "sensor", "loc", "location", "geometry", "geom", "points_m_xyz", "first", "1",
 )  # fmt: skip
 # What surveyors call x, y and z. Not `east` and `north`, which the prose of comments holds too.
 _SURVEY = (

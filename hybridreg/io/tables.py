@@ -14,6 +14,7 @@ from hybridreg.io.arrays import array_points, refuse_raw_las
 from hybridreg.io.column_names import axes_in, find_axes
 from hybridreg.io.coordinate_systems.length_unit import in_metres
 from hybridreg.io.faults import fault, shorten
+from hybridreg.io.list_columns import refuse_clouds_in_rows
 from hybridreg.io.meaning.beside_points import changes_points, with_what_is_beside
 from hybridreg.io.meaning.downward import tell_downward
 from hybridreg.io.meaning.first_column import FEWEST
@@ -71,7 +72,10 @@ def points(x: Any, names: list[Any], name: str) -> Array:
         raise fault(name, f"x, y and z have the lengths {lengths}", "give them equally long")
     if all(np.array_equal(column, np.round(column)) for column in columns):
         refuse_raw_las(told, name)
-    tell_downward(_attributes(_column(x, axes.columns[2], names)).get("positive"), name)
+    upright = _column(x, axes.columns[2], names)
+    tell_downward(
+        _attributes(upright).get("positive", getattr(upright, "positive", None)), name
+    )  # or netCDF4's
     metres = axes.metres if axes.metres is not None else _unit(x, axes.columns, names, name)
     points = with_what_is_beside(stack_axes(*columns), beside(x, names, axes.columns), name)
     return in_metres(points, metres, name)
@@ -152,8 +156,13 @@ def _numbers(x: Any, k: int, names: list[Any], name: str) -> Array:
     try:
         return np.ravel(_floats(values))
     except (TypeError, ValueError) as error:
+        refuse_clouds_in_rows(next(iter(_objects(values)), None), names[k], name)
         problem = f"column {shorten(names[k])} holds something else than numbers ({shorten(error)})"
         raise fault(name, problem, "convert it to float") from error
+
+
+def _objects(values: Any) -> NDArray[Any]:
+    return np.ravel(values.to_numpy() if hasattr(values, "to_numpy") else np.asarray(values, object))
 
 
 def _floats(values: Any) -> NDArray[Any]:
