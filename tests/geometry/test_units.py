@@ -61,6 +61,17 @@ def test_whole_numbers(factor: float, unit: str) -> None:
     assert unit in mixed["source"]
 
 
+@pytest.mark.parametrize("reach", [600.0, 1600.0, 4000.0])
+def test_whole_numbers_of_a_depth_camera_may_be_millimetres(reach: float) -> None:
+    # Those that reach 1600 were said to be centimetres alone: a table as large as a hall.
+    whole = np.random.default_rng(0).uniform(-reach, reach, (500, 3)).astype(np.int16)
+    found = said(whole, whole + 3)
+    assert all(
+        "probably millimetres or centimetres; multiply by 0.001 or 0.01 if so" in text
+        for text in found.values()
+    )
+
+
 @pytest.mark.parametrize("where", [(7.1, 50.7), (-122.4, 37.8), (151.2, -33.9)])
 def test_longitude_and_latitude(where: tuple[float, float]) -> None:
     degrees = np.column_stack([STREET.source.points[:, :2] / 1e5 + where, STREET.source.points[:, 2] + 100])
