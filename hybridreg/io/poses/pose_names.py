@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -32,7 +33,14 @@ _COUNTED = re.compile(r"(.*?)[_.\[(]?(\d)[\])]?")
 _INNER = re.compile(r"[\[(]([^\[\]()]+)[\])]\W*$")
 
 
-def in_order(row: Sequence[float], before: Sequence[str], name: str) -> list[float] | None:
+class Named(NamedTuple):
+    """x y z qx qy qz qw, and whether a unit stood beside the names of x, y and z, so that they are metres."""
+
+    numbers: list[float]
+    has_unit: bool = False
+
+
+def in_order(row: Sequence[float], before: Sequence[str], name: str) -> Named | None:
     """x y z qx qy qz qw of a row of numbers, by the last of the lines before it that names every column.
 
     Many tools write w before x, y and z, and say so only there, as EuRoC's files do. None where no line names a
@@ -50,10 +58,10 @@ def in_order(row: Sequence[float], before: Sequence[str], name: str) -> list[flo
             if found is not None:
                 position, metres, quaternion = found
                 place = in_metres(np.array([[row[k] for k in position]]), metres, name)
-                return [*place[0].tolist(), *(row[k] for k in quaternion)]
+                return Named([*place[0].tolist(), *(row[k] for k in quaternion)], metres is not None)
             _refuse_counted(names, name)
         if len(row) in (_POSE, _POSE + 1) and _W_FIRST.search(line):
-            return [*row[-7:-4], *row[-3:], row[-4]]
+            return Named([*row[-7:-4], *row[-3:], row[-4]])
     return None
 
 

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: MIT
 from __future__ import annotations
 
+import json
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -101,3 +103,33 @@ def test_named_columns_that_hold_no_rotation_are_refused(tmp_path: Path) -> None
     path.write_text(f"# x y z qw qx qy qz\n{T} {WXYZ}\n{T} {WXYZ}\n")
     with pytest.raises(ValueError, match="holds 2 poses"):
         read_pose(path)
+
+
+IN_MM = POSE.copy()
+IN_MM[:3, 3] *= 1000.0
+
+
+@pytest.mark.parametrize(
+    "name, text",
+    [
+        ("a.txt", f"# unit: mm\n# angles in degrees\n4000 -5500 250 {Q}"),
+        ("a.txt", f"# all values in mm\n# x y z qw qx qy qz\n4000 -5500 250 {WXYZ}"),
+        ("a.txt", "% units: mm\n" + "\n".join(" ".join(map(repr, row)) for row in IN_MM.tolist())),
+        ("a.json", json.dumps({"unit": "mm", "T": IN_MM.tolist()})),
+    ],
+)
+def test_a_comment_or_an_entry_gives_the_unit(tmp_path: Path, name: str, text: str) -> None:
+    # Without a word the pose was a thousand times too far.
+    path = tmp_path / name
+    path.write_text(text)
+    with pytest.warns(UserWarning, match=r"its unit is 0\.001 m; it was read in metres"):
+        found = read_pose(path)
+    np.testing.assert_allclose(found, POSE, rtol=0, atol=1e-12)
+
+
+def test_comments_about_angles_and_metres_change_nothing(tmp_path: Path) -> None:
+    path = tmp_path / "a.txt"
+    path.write_text(f"# unit: m\n# rotation as a quaternion, unit length\n# angles: 30 deg, 2 rad\n{T} {Q}")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        np.testing.assert_allclose(read_pose(path), POSE, rtol=0, atol=1e-14)
