@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # open3d 0.20.0 reads of a `.pts` file with several scans, each begun by the number of its points as scanners' programs export
-# them, the first scan alone, without a warning. So do both of its interfaces. Two files of one scan each come out whole.
+# them, the first scan alone, without a word about the rest, by both of its interfaces. Files of one scan come out whole.
 #
 # Guess before it was run: all points, or a warning that more follows.
 # For whom it matters: whoever registers exports of a project with several setups: half of the place is missing, and the
