@@ -240,6 +240,7 @@ FIRST_ROWS = {
     'its first row, "\' Trimble", is no comment': f"' Trimble\n{ROWS}",
     "its numbers are separated by ':': '1:2:3'": "1:2:3\n" * 30,
     "its numbers are separated by '|': '1.5|2|3'; separate them by": ROWS.replace(",", "|"),
+    "its numbers are separated by '|': '1.5|2|3'; separate them": "x|y|z\n" + ROWS.replace(",", "|"),
     "its numbers have separators of thousands: \"450'002.74;5'399'995.40;299.39\"; export them without": (
         "450'002.74;5'399'995.40;299.39\n" * 30
     ),

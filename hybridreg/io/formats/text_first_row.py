@@ -38,10 +38,12 @@ def axes_of_first_row(rows: Sequence[str], names: Sequence[str], name: str) -> A
 def _instead(rows: Sequence[str]) -> tuple[str, str]:
     """What the first row is and what to do about it; "" where it may be names."""
     row = rows[0]
-    mark = _OTHER_MARK.match(row)
+    mark = next(
+        filter(None, map(_OTHER_MARK.match, rows[:2])), None
+    )  # in the second where the first has names
     if mark:
         return (
-            f"its numbers are separated by {mark.group(1)!r}: {shorten(row)}",
+            f"its numbers are separated by {mark.group(1)!r}: {shorten(mark.string)}",
             "separate them by spaces or commas",
         )
     if _FORTRAN.match(row):

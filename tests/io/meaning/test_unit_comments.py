@@ -87,6 +87,9 @@ def test_prose_changes_nothing_and_alarms_nobody(comment: str) -> None:
         ("quantization: 0.001", "'quantization: 0.001'"),
         ("global shift 400000 5000000 0", "are to be shifted by that"),
         ("offset: -1,2,3", "'offset: -1,2,3'"),
+        ("GlobalShift: -500000 -5400000 0", "Shift: -500000 -5400000 0"),
+        ("local origin (500000, 5400000, 0)", "local origin (500000, 5400000, 0"),
+        ("global shift = [500000.0, 5400000.0, 0.0]", "shift = [500000.0, 5400000.0, 0.0"),
     ],
 )
 def test_what_may_be_meant_of_the_coordinates_is_told(comment: str, words: str) -> None:
