@@ -104,6 +104,24 @@ def test_no_returns_are_told_and_left_out_on_request() -> None:
     assert np.array_equal(both.points, points[2::3])
 
 
+@pytest.mark.parametrize("height", [-9999.0, -99999.0, -32768.0])
+def test_cells_without_data_are_told_and_left_out_on_request(height: float) -> None:
+    # GDAL's XYZ, to which this library sends users with elevation models, writes them like others.
+    points = STREET.source.points.copy()
+    points[:3, 2] = height
+    with pytest.warns(
+        UserWarning, match=rf"cloud: 3 of {len(points)} points have the height {height:g}, which rasters"
+    ):
+        assert len(PointCloud.of(points)) == len(points)
+    kept = PointCloud.of(points, nonfinite="drop", viewpoint=np.tile([0.0, 0.0, 1.0], (len(points), 1)))
+    assert kept.dropped == 3
+    assert np.array_equal(kept.points, points[3:])
+    points[:, 2] = np.linspace(height, 0.0, len(points))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        PointCloud.of(points)
+
+
 def test_one_point_at_the_origin_is_a_point() -> None:
     points = np.vstack([STREET.source.points, np.zeros(3)])
     with warnings.catch_warnings():
