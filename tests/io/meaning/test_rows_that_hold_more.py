@@ -57,3 +57,11 @@ def test_a_row_that_is_a_whole_cloud_is_refused_with_how_to_take_it(
         cure = re.search(r"in pandas: (.*)", str(caught.value))
         assert cure is not None
         np.testing.assert_array_equal(PointCloud.of(eval(cure.group(1), {"x": x, "numpy": np})).points, P)
+
+
+def test_a_column_of_units() -> None:
+    table = pd.DataFrame(P * 1000.0, columns=list("xyz")).assign(unit="mm")
+    with pytest.warns(UserWarning, match=r"its unit is 0\.001 m; it was read in metres"):
+        np.testing.assert_allclose(PointCloud.of(table).points, P, rtol=0, atol=1e-12)
+    mixed = table.assign(unit=["mm", "m"] * 30)
+    np.testing.assert_allclose(PointCloud.of(mixed).points, P * 1000.0)
