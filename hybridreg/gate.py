@@ -75,7 +75,7 @@ def returned(
     fewest = max(MIN_POINTS, _FILLED * len(points))
     if np.count_nonzero(points[:, 0] == 0.0) < fewest:
         return points, rows
-    good = points.any(axis=1)
+    good: NDArray[np.bool_] = np.asarray(points.any(axis=1))
     n_bad = len(points) - int(good.sum())
     if n_bad < fewest or n_bad == len(points):
         return points, rows
