@@ -23,6 +23,8 @@ _THINNEST = 1e-6
 OR_DROP = ' or pass nonfinite="drop"'
 _LOT = 2**18  # points
 _FILLED = 0.01  # share of points exactly at the origin from which they count as missing returns
+# Heights that rasters write for cells without data; other points must be far above them.
+_NO_HEIGHT = (-9999.0, -99999.0, -32768.0, -32767.0)
 _COARSE = 0.01  # metres between coordinates from which their rounding is reported
 _TINY = 1e-12  # metres, for the logarithm of zero
 _WHOLE = 1e-6  # of a digit, off by which a decimal number in double precision may be
@@ -66,12 +68,14 @@ def finite(points: Array, name: str, *, drop: bool) -> tuple[Array, NDArray[np.b
 def returned(
     points: Array, rows: NDArray[np.bool_] | None, name: str, *, drop: bool
 ) -> tuple[Array, NDArray[np.bool_] | None]:
-    """Warn of many points exactly at (0, 0, 0), which drivers write for missing returns, or drop them on request.
-    `rows` (N,) are those that `finite` kept; the result is of the same form."""
+    """Warn of many points exactly at (0, 0, 0), which drivers write for missing returns, and of heights that rasters
+    write for cells without data, or drop them on request. `rows` (N,) are those that `finite` kept; the result is of
+    the same form."""
+    points, rows = _measured(points, rows, name, drop=drop)
     fewest = max(MIN_POINTS, _FILLED * len(points))
     if np.count_nonzero(points[:, 0] == 0.0) < fewest:
         return points, rows
-    good = points.any(axis=1)
+    good: NDArray[np.bool_] = np.asarray(points.any(axis=1))
     n_bad = len(points) - int(good.sum())
     if n_bad < fewest or n_bad == len(points):
         return points, rows
@@ -83,9 +87,34 @@ def returned(
             stacklevel=4,
         )
         return points, rows
-    kept = np.ones(len(points), dtype=bool) if rows is None else rows.copy()
+    return points[good], _kept(rows, good)
+
+
+def _measured(
+    points: Array, rows: NDArray[np.bool_] | None, name: str, *, drop: bool
+) -> tuple[Array, NDArray[np.bool_] | None]:
+    lowest = float(points[:, 2].min(initial=0.0))
+    if lowest not in _NO_HEIGHT:
+        return points, rows
+    good = points[:, 2] != lowest
+    if not good.any() or points[good, 2].min() < 0.5 * lowest:
+        return points, rows
+    if drop:
+        return points[good], _kept(rows, good)
+    n_bad = len(points) - int(good.sum())
+    warnings.warn(
+        f"{name}: {n_bad} of {len(points)} points have the height {lowest:g}, which rasters write for cells without "
+        f"data; remove them{OR_DROP}",
+        UserWarning,
+        stacklevel=5,
+    )
+    return points, rows
+
+
+def _kept(rows: NDArray[np.bool_] | None, good: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    kept = np.ones(len(good), dtype=bool) if rows is None else rows.copy()
     kept[kept] = good
-    return points[good], kept
+    return kept
 
 
 def rounded(points: Array, name: str) -> None:

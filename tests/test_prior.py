@@ -389,11 +389,28 @@ def test_a_result_in_place_of_its_pose_is_told(held: str) -> None:
         Prior(init=SimpleNamespace(**{held: TURNED}))
 
 
-@pytest.mark.parametrize("held", ["matrix", "as_matrix", "to_mat", "to_homogeneous", "to_homogenous_matrix"])
+@pytest.mark.parametrize(
+    "held", ["matrix", "as_matrix", "to_mat", "to_homogeneous", "to_homogenous_matrix", "homogeneous_matrix"]
+)
 def test_a_pose_of_another_library_in_place_of_its_matrix_is_told(held: str) -> None:
     # As gtsam 4.3.0, scipy 1.17, evalio 0.6.1, roma 1.8.0 and symforce 0.12.0 call it.
     with pytest.raises(ValueError, match=rf"init: expected numbers .*; give its {held}\(\)"):
         Prior(init=SimpleNamespace(**{held: lambda: TURNED}))
+
+
+def test_messages_and_parts_in_place_of_a_matrix_are_told() -> None:
+    x, y, z, w = quaternion(TURNED[:3, :3])
+    turn, place = SimpleNamespace(x=x, y=y, z=z, w=w), SimpleNamespace(x=1.0, y=2.0, z=3.0)
+    pose = SimpleNamespace(position=place, orientation=turn)
+    for message, words in (
+        (pose, "its position"),
+        (SimpleNamespace(header=0, pose=pose), "its orientation"),
+        (SimpleNamespace(transform=SimpleNamespace(translation=place, rotation=turn)), "its translation"),
+        ((TURNED[:3, :3], TURNED[:3, 3]), r"numpy\.column_stack\(\[R, t\]\)"),
+        ({"T": TURNED, "error": 0.1}, "give the matrix in it, of T, error"),
+    ):
+        with pytest.raises(ValueError, match=f"init: expected numbers .*; .*{words}"):
+            Prior(init=message)
 
 
 @pytest.mark.parametrize("quoted", [False, True])

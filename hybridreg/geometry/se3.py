@@ -24,7 +24,10 @@ _HOLD = (
     "to_mat",
     "to_homogeneous",
     "to_homogenous_matrix",
+    "homogeneous_matrix",
 )
+# Where ROS's messages keep theirs, inside of others perhaps.
+_IN_ROS = (("pose", "position", "orientation"), ("transform", "translation", "rotation"))
 
 
 def from_rt(R: Array, t: Array) -> Array:
@@ -143,9 +146,7 @@ def check(T: Any, name: str = "T", tolerance: float = 1e-4) -> Array:
     try:
         matrix = np.asarray(T, dtype=np.float64)
     except (TypeError, ValueError, OverflowError) as error:
-        held = next((each for each in _HOLD if hasattr(T, each)), "")
-        cure = f"; give its {held}{'()' if callable(getattr(T, held)) else ''}" if held else ""
-        raise ValueError(f"{name}: expected numbers of shape (4, 4) ({error}){cure}") from error
+        raise ValueError(f"{name}: expected numbers of shape (4, 4) ({error}){_cure_of(T)}") from error
     if matrix.shape != (4, 4):
         raise ValueError(f"{name}: expected shape (4, 4), got {matrix.shape}{_CURES.get(matrix.shape, '')}")
     if not np.isfinite(matrix).all():
@@ -163,6 +164,25 @@ def check(T: Any, name: str = "T", tolerance: float = 1e-4) -> Array:
             f"determinant {determinant:.3g}); remove scale or reflection"
         )
     return matrix
+
+
+def _cure_of(T: Any) -> str:
+    """What to do with an object that is no matrix, where it is known."""
+    held = next((each for each in _HOLD if hasattr(T, each)), "")
+    if held:
+        return f"; give its {held}{'()' if callable(getattr(T, held)) else ''}"
+    for outer, place, turn in _IN_ROS:
+        inner = getattr(T, outer, T)
+        if hasattr(inner, place) and hasattr(getattr(inner, turn, None), "w"):
+            return (
+                f"; of a message of ROS: T = numpy.eye(4), T[:3, 3] = x, y, z of its {place}, T[:3, :3] = "
+                f"scipy.spatial.transform.Rotation.from_quat([q.x, q.y, q.z, q.w]).as_matrix() of its {turn}"
+            )
+    if isinstance(T, (tuple, list)) and [np.size(each) for each in T] == [9, 3]:
+        return "; of a rotation and a translation: numpy.vstack([numpy.column_stack([R, t]), [0, 0, 0, 1]])"
+    if isinstance(T, dict):
+        return f"; give the matrix in it, of {', '.join(map(str, T))}"[:200]
+    return ""
 
 
 def rounded(T: Any, name: str, tolerance: float) -> Array:

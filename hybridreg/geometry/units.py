@@ -68,15 +68,15 @@ def _whole_numbers(cloud: PointCloud, other: PointCloud) -> str:
     if not _is_whole(cloud):
         return ""
     own = reach(cloud.radii)
-    # The other cloud's extent, in metres, is the best guess of this one's.
-    aim = reach(other.radii) if not _is_whole(other) and _plausible(other) else _USUAL
     if own <= 0.0:
         return ""
-    metres, unit = min(_UNITS[:2], key=lambda each: abs(np.log(own * each[0] / aim)))
-    return (
-        f"every coordinate is a whole number, and it reaches {own:.3g}: probably {unit}; multiply by {metres:g} "
-        "if so, lengths here are metres"
-    )
+    if not _is_whole(other) and _plausible(other):  # its extent, in metres, is the best guess of this one's
+        aim = reach(other.radii)
+        likely = [min(_UNITS[:2], key=lambda each: abs(np.log(own * each[0] / aim)))]
+    else:  # 1600 is a table before a depth camera, or a hall
+        likely = [each for each in _UNITS[:2] if _SHORTEST <= own * each[0] <= _LONGEST]
+        likely = likely or [min(_UNITS[:2], key=lambda each: abs(np.log(own * each[0] / _USUAL)))]
+    return f"every coordinate is a whole number, and it reaches {own:.3g}: {_named(likely)}"
 
 
 def _plausible(cloud: PointCloud) -> bool:
@@ -100,11 +100,13 @@ def _unlike(pair: Pair) -> dict[str, str]:
     likely = _likely(ratio)
     if not likely:
         return {large: f"it reaches {told}: is one of them in another unit, or another place?"}
+    return {large: f"it reaches {told}: {_named(likely)}"}
+
+
+def _named(likely: list[tuple[float, str]]) -> str:
     units = " or ".join(unit for _, unit in likely)
     factors = " or ".join(f"{metres:g}" for metres, _ in likely)
-    return {
-        large: f"it reaches {told}: probably {units}; multiply by {factors} if so, lengths here are metres"
-    }
+    return f"probably {units}; multiply by {factors} if so, lengths here are metres"
 
 
 def _likely(ratio: float) -> list[tuple[float, str]]:

@@ -8,6 +8,7 @@ from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 from hybridreg.io.faults import fault, shorten
+from hybridreg.io.meaning.downward import refuse_downward, tell_downward
 from hybridreg.io.meaning.spherical import refuse_spherical
 from hybridreg.io.meaning.unit_words import ANGLES, known_metres, tell_cells
 
@@ -15,7 +16,7 @@ _AXES = ("x", "y", "z")
 # What tools put before or behind an axis: ROS, E57, ParaView, spreadsheets. Not `n` or `v`: normals and velocities.
 _AFFIXES = (
     "point", "points", "pos", "position", "coord", "coords", "coordinate", "cartesian", "p", "xyz", "lidar", "velo",
-    "sensor", "loc", "location", "points_m_xyz", "first", "1",
+    "sensor", "loc", "location", "geometry", "geom", "points_m_xyz", "first", "1",
 )  # fmt: skip
 # What surveyors call x, y and z. Not `east` and `north`, which the prose of comments holds too.
 _SURVEY = (
@@ -81,6 +82,8 @@ def axes_in(names: Sequence[str], name: str) -> Axes:
         raise fault(name, problem, "project them to metres first, for example with pyproj to UTM")
     if "x" not in stems:
         refuse_spherical(names, name)
+    if "z" not in stems:
+        refuse_downward(names, name)
     axis = next(axis for axis in _AXES if stems.count(axis) != 1)
     problem = f"has {stems.count(axis)} fields called {axis!r} among {held}"
     raise fault(name, problem, "name the coordinates x, y and z, each once")
@@ -132,6 +135,7 @@ def _with_unit(columns: tuple[int, int, int], parsed: Sequence[tuple[str, str]],
     if angle is not None:
         raise fault(name, f"its x, y or z is in {angle!r}", "give Cartesian coordinates in metres")
     tell_cells(units, name)
+    tell_downward(units[2], name)
     known = [known_metres(unit) for unit in units]
     metres = [1.0 if each is None else each for each in known]
     if len(set(metres)) > 1:

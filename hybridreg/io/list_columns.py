@@ -43,11 +43,51 @@ def listed_points(x: Any, names: list[Any], name: str) -> Array | None:
     return listed if found is None or found[1] is None else in_metres(listed[:, :3], found[1], name)
 
 
+def without_records(x: Any, name: str) -> Any:
+    """A table of pyarrow whose columns of records, such as a point's x, y and z, are columns of their own.
+
+    Raises
+    ------
+    ValueError
+        Its points are geometries in binary (WKB), as GeoParquet has them.
+    """
+    kinds = {field.name: str(field.type) for field in x.schema}
+    if {"x", "y", "z"} <= {each.lower() for each in kinds}:
+        return x
+    told = (x.schema.metadata or {}).get(b"geo")
+    if told is not None and "binary" in kinds.values() and b'"WKB"' in told:
+        cure = "give geopandas.read_parquet(path).get_coordinates(include_z=True)"
+        raise fault(name, "its points are geometries in binary (WKB)", cure)
+    return x.flatten() if any(kind.startswith("struct") for kind in kinds.values()) else x
+
+
+def refuse_clouds_in_rows(value: Any, label: Any, name: str) -> None:
+    """Refuse a column that holds a list of points, or of coordinates, in each row, by the first of them.
+
+    Raises
+    ------
+    ValueError
+        It does; it says how to take the cloud of one row.
+    """
+    if isinstance(value, (list, tuple, np.ndarray)) and np.ndim(value) and len(value) > _MOST:
+        nested = isinstance(value[0], (list, tuple, np.ndarray))
+        cure = (
+            f"numpy.stack(x[{str(label)!r}][0])"
+            if nested
+            else "{axis: numpy.array(x[axis][0]) for axis in 'xyz'}"
+        )
+        problem = (
+            f"column {shorten(label)} holds {len(value)} {'points' if nested else 'numbers'} in its first row"
+        )
+        raise fault(name, problem, f"give the cloud of one row; where x is the table in pandas: {cure}")
+
+
 def _stacked(values: NDArray[Any], label: Any, name: str) -> Array | None:
     rows = [each for each in values if isinstance(each, (list, tuple, np.ndarray))]
     lengths = sorted({len(each) for each in rows})
     if not rows:
         return None
+    refuse_clouds_in_rows(rows[0], label, name)
     if len(lengths) > 1:
         problem = f"the lists of its column {shorten(label)} hold from {lengths[0]} to {lengths[-1]} numbers"
         raise fault(name, problem, "give three numbers a point")

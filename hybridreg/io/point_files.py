@@ -16,7 +16,7 @@ from hybridreg.io.formats.las import parse_las
 from hybridreg.io.formats.npy import parse_npy
 from hybridreg.io.formats.npz import parse_npz
 from hybridreg.io.formats.pcd import parse_pcd, pcd_viewpoint
-from hybridreg.io.formats.ply import parse_ply
+from hybridreg.io.formats.ply import SPLATS, parse_ply
 from hybridreg.io.formats.text import parse_text
 from hybridreg.io.recorded.arrow_tables import read_arrow
 from hybridreg.io.recorded.bag_reader import read_bag
@@ -40,14 +40,28 @@ _SIGNED = (".e57", ".bag", ".db3", ".mcap", ".parquet", ".feather", ".glb", ".lv
 _ELSEWHERE = {
     ".ptx": "export it as .ply or .pts, for example with CloudCompare",
     ".rcp": "export it as .pts or .e57 in ReCap, and that as .ply",
-    ".pcap": "convert one frame with the sensor's own tool to .csv, .pcd or .las",
+    **dict.fromkeys(
+        (".pcap", ".pcapng"), "convert one frame with the sensor's own tool to .csv, .pcd or .las"
+    ),
     ".osf": "save one frame with `ouster-cli source FILE slice 0:1 save OUT.ply`",
     ".lvx": "convert it with Livox Viewer 2 to .lvx2 or .las",
     ".vtk": "save it as .vtp or .ply, for example with ParaView",
     ".vtu": "save its surface as .vtp or .ply, for example by ParaView's Extract Surface",
     ".pvtp": "it names pieces in other files: give one of those, or save all as one .vtp",
     ".mat": "save the array in it as .csv or .npy",
-    ".h5": "save the array in it as .npy",
+    **dict.fromkeys(
+        (".h5", ".hdf5", ".nc", ".zarr", ".pkl", ".pickle", ".pt", ".pth"), "save the array in it as .npy"
+    ),
+    **dict.fromkeys((".splat", ".spz", ".ksplat", ".sog"), SPLATS),
+    **dict.fromkeys(
+        (".fls", ".zfs", ".rxp", ".rcs", ".rdbx", ".lsproj", ".tzf", ".imp", ".ptg"),
+        "export it as .e57 with the scanner's own program",
+    ),
+    **dict.fromkeys((".tif", ".tiff"), "if it holds heights: gdal_translate -of XYZ IN out.xyz"),
+    **dict.fromkeys(
+        (".gpkg", ".shp", ".geojson"), "convert it: ogr2ogr -f CSV out.csv IN -lco GEOMETRY=AS_XYZ"
+    ),
+    ".drc": "decode it: draco_decoder -i in.drc -o out.ply",
     ".active": "its recording was cut off: run `rosbag reindex` on it, and rename it to end in .bag",
     ".zstd": "of a ROS 2 bag give the folder, unpack anything else first",
     ".yaml": "of a ROS 2 bag give the folder",

@@ -17,7 +17,7 @@ from hybridreg.io.coordinate_systems.las_extended import records_of_header
 from hybridreg.io.coordinate_systems.las_units import metres_of_las
 from hybridreg.io.coordinate_systems.length_unit import in_metres
 from hybridreg.io.formats.las_withheld import without_withheld
-from hybridreg.io.list_columns import listed_points
+from hybridreg.io.list_columns import listed_points, without_records
 from hybridreg.io.meaning.beside_points import refuse_second_cloud, with_what_is_beside
 from hybridreg.io.meaning.length_units import unit_given
 from hybridreg.io.recorded import ros_messages, vtk_objects
@@ -113,6 +113,9 @@ def _from_table(x: Any, names: list[Any], name: str, depth: int) -> Array:
         found = together_in(names) or ((names.index("arr_0"), None) if "arr_0" in names else None)
         if found is not None:
             return _entry(x, names[found[0]], found[1], name, depth)
+    if hasattr(x, "schema") and hasattr(x, "flatten"):
+        x = without_records(x, name)
+        names = list(x.schema.names)
     listed = None if isinstance(x, Mapping) else listed_points(x, names, name)
     if listed is not None:
         return _from_array(listed, name)

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybridreg.io.faults import fault, shorten
+from hybridreg.io.meaning.downward import refuse_downward
 from hybridreg.io.meaning.spherical import refuse_spherical
 
 AXES = ("x", "y", "z")
@@ -29,6 +30,8 @@ def axis_columns(fields: Sequence[str], name: str) -> tuple[int, int, int]:
     lowered = [field.lower() for field in fields]
     if "x" not in lowered:
         refuse_spherical(fields, name)
+    if "z" not in lowered:
+        refuse_downward(fields, name)
     for axis in AXES:
         if lowered.count(axis) != 1:
             held = shorten(", ".join(fields), 200)

@@ -30,6 +30,8 @@ _KINDS: tuple[tuple[bytes, Kind], ...] = (
     (b"# .PCD", Kind(words="a PCD file", suffix=".pcd")),
     (b"\x93NUMPY", Kind(words="a NumPy array", suffix=".npy")),
     (b"LASF", Kind(words="a LAS file", suffix=".las")),
+    (b"~V", Kind(words="a log of a well (the other LAS, of the CWLS)")),
+    (b"~v", Kind(words="a log of a well (the other LAS, of the CWLS)")),
     (b"CCB", Kind(words="CloudCompare's own format", cure="save it there as .ply or .las")),
     (b"ASTM-E57", Kind(words="an E57 file", suffix=".e57")),
     (b"PAR1", Kind(words="a Parquet table", suffix=".parquet")),

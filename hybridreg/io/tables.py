@@ -14,16 +14,20 @@ from hybridreg.io.arrays import array_points, refuse_raw_las
 from hybridreg.io.column_names import axes_in, find_axes
 from hybridreg.io.coordinate_systems.length_unit import in_metres
 from hybridreg.io.faults import fault, shorten
+from hybridreg.io.list_columns import refuse_clouds_in_rows
 from hybridreg.io.meaning.beside_points import changes_points, with_what_is_beside
+from hybridreg.io.meaning.downward import tell_downward
 from hybridreg.io.meaning.first_column import FEWEST
 from hybridreg.io.meaning.image_shapes import refuse_image
 from hybridreg.io.meaning.length_units import one_unit, unit_given
+from hybridreg.io.meaning.unit_words import known_metres
 from hybridreg.io.record_fields import stack_axes
 
 Array = NDArray[np.float64]
 
 # What pandas, polars and pyarrow call the columns of a file without names.
 _WIDEST = 6  # numbers a point: x, y, z and what sensors add
+_UNITS = ("unit", "units")  # what a column of units is called
 _UNNAMED = re.compile(r"(column_?|f|v|_)?\d+", re.IGNORECASE)
 
 
@@ -70,6 +74,10 @@ def points(x: Any, names: list[Any], name: str) -> Array:
         raise fault(name, f"x, y and z have the lengths {lengths}", "give them equally long")
     if all(np.array_equal(column, np.round(column)) for column in columns):
         refuse_raw_las(told, name)
+    upright = _column(x, axes.columns[2], names)
+    tell_downward(
+        _attributes(upright).get("positive", getattr(upright, "positive", None)), name
+    )  # or netCDF4's
     metres = axes.metres if axes.metres is not None else _unit(x, axes.columns, names, name)
     points = with_what_is_beside(stack_axes(*columns), beside(x, names, axes.columns), name)
     return in_metres(points, metres, name)
@@ -101,11 +109,13 @@ def beside(x: Any, names: list[Any], columns: Iterable[int] = ()) -> dict[str, A
 
 def attributes_beside(x: Any) -> dict[str, Any]:
     """Those attributes of an object that may change its points."""
+    return {str(key): value for key, value in _attributes(x).items() if changes_points(key)}
+
+
+def _attributes(x: Any) -> Mapping[Any, Any]:
     # As NetCDF and HDF5 keep them: xarray's and h5py's; pandas has them too.
     attributes = getattr(x, "attrs", None)
-    if not isinstance(attributes, Mapping):
-        return {}
-    return {str(key): value for key, value in attributes.items() if changes_points(key)}
+    return attributes if isinstance(attributes, Mapping) else {}
 
 
 def _unit(x: Any, columns: tuple[int, int, int], names: list[Any], name: str) -> float | None:
@@ -114,7 +124,12 @@ def _unit(x: Any, columns: tuple[int, int, int], names: list[Any], name: str) ->
         said = one_unit((unit_given(x.schema.field(k), name) for k in columns), name)
         return unit_given(x.schema, name) if said is None else said
     said = one_unit((unit_given(_column(x, k, names), name) for k in columns), name)
-    return unit_given(x, name) if said is None else said
+    said = unit_given(x, name) if said is None else said
+    column = next((k for k, each in enumerate(names) if str(each).lower() in _UNITS), None)
+    if said is not None or column is None or isinstance(x, Mapping):
+        return said
+    words = set(_objects(_column(x, column, names)).tolist())
+    return known_metres(str(words.pop())) if len(words) == 1 else None
 
 
 def _along(x: Any) -> Any:
@@ -148,8 +163,13 @@ def _numbers(x: Any, k: int, names: list[Any], name: str) -> Array:
     try:
         return np.ravel(_floats(values))
     except (TypeError, ValueError) as error:
+        refuse_clouds_in_rows(next(iter(_objects(values)), None), names[k], name)
         problem = f"column {shorten(names[k])} holds something else than numbers ({shorten(error)})"
         raise fault(name, problem, "convert it to float") from error
+
+
+def _objects(values: Any) -> NDArray[Any]:
+    return np.ravel(values.to_numpy() if hasattr(values, "to_numpy") else np.asarray(values, object))
 
 
 def _floats(values: Any) -> NDArray[Any]:

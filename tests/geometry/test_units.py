@@ -61,6 +61,17 @@ def test_whole_numbers(factor: float, unit: str) -> None:
     assert unit in mixed["source"]
 
 
+@pytest.mark.parametrize("reach", [600.0, 1600.0, 4000.0])
+def test_whole_numbers_of_a_depth_camera_may_be_millimetres(reach: float) -> None:
+    # Those that reach 1600 were said to be centimetres alone: a table as large as a hall.
+    whole = np.random.default_rng(0).uniform(-reach, reach, (500, 3)).astype(np.int16)
+    found = said(whole, whole + 3)
+    assert all(
+        "probably millimetres or centimetres; multiply by 0.001 or 0.01 if so" in text
+        for text in found.values()
+    )
+
+
 @pytest.mark.parametrize("where", [(7.1, 50.7), (-122.4, 37.8), (151.2, -33.9)])
 def test_longitude_and_latitude(where: tuple[float, float]) -> None:
     degrees = np.column_stack([STREET.source.points[:, :2] / 1e5 + where, STREET.source.points[:, 2] + 100])
@@ -91,6 +102,24 @@ def test_no_returns_are_told_and_left_out_on_request() -> None:
     points[1::3] = np.nan
     both = PointCloud.of(points, nonfinite="drop", viewpoint=np.tile([0.0, 0.0, 1.0], (len(points), 1)))
     assert np.array_equal(both.points, points[2::3])
+
+
+@pytest.mark.parametrize("height", [-9999.0, -99999.0, -32768.0])
+def test_cells_without_data_are_told_and_left_out_on_request(height: float) -> None:
+    # GDAL's XYZ, to which this library sends users with elevation models, writes them like others.
+    points = STREET.source.points.copy()
+    points[:3, 2] = height
+    with pytest.warns(
+        UserWarning, match=rf"cloud: 3 of {len(points)} points have the height {height:g}, which rasters"
+    ):
+        assert len(PointCloud.of(points)) == len(points)
+    kept = PointCloud.of(points, nonfinite="drop", viewpoint=np.tile([0.0, 0.0, 1.0], (len(points), 1)))
+    assert kept.dropped == 3
+    assert np.array_equal(kept.points, points[3:])
+    points[:, 2] = np.linspace(height, 0.0, len(points))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        PointCloud.of(points)
 
 
 def test_one_point_at_the_origin_is_a_point() -> None:

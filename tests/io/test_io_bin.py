@@ -192,3 +192,13 @@ def test_maps_of_colmap_are_no_clouds(shape):
     data = f"{wide}&{high}&{channels}&".encode() + depths.tobytes()
     with pytest.raises(ValueError, match=rf"COLMAP \({wide} x {high}\), not a cloud; .*fused\.ply"):
         parse_bin(data, "a.jpg.geometric.bin")
+
+
+@pytest.mark.parametrize("n", [61, 100, 201, 211])
+def test_few_rows_of_seven_numbers_of_a_radar(n):
+    # As View-of-Delft has them: x, y, z, cross section, two speeds, the scan. Nothing narrower divides 211 rows.
+    rng = np.random.default_rng(n)
+    points = rng.normal([25.0, 0.0, 0.0], [10.0, 8.0, 1.5], (n, 3))
+    others = np.c_[rng.normal(-10, 12, n), rng.normal(-3, 4, n), rng.normal(0, 0.3, n), np.zeros(n)]
+    table = np.c_[points, others].astype("<f4")
+    np.testing.assert_array_equal(parse_bin(table.tobytes(), "00123.bin"), table[:, :3])

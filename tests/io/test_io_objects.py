@@ -218,7 +218,7 @@ def test_a_unit_in_the_data_is_believed_and_told_once(kind: str) -> None:
 @pytest.mark.filterwarnings("error")
 def test_what_is_called_unit_and_is_none() -> None:
     pd = pytest.importorskip("pandas")
-    same(pd.DataFrame(P, columns=list("xyz")).assign(unit="mm", units=1.0))
+    same(pd.DataFrame(P, columns=list("xyz")).assign(unit="B 12", units=1.0))
     same({**dict(zip("xyz", P.T, strict=True)), "unit": P[:, 0]})
     same(SimpleNamespace(points=P, units="m"))
     same(SimpleNamespace(points=P, units=None))

@@ -11,6 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hybridreg.io.formats.ply import parse_ply
+from hybridreg.io.point_files import parse_points
 
 STRUCT = {"char": "b", "uchar": "B", "short": "h", "ushort": "H", "int": "i", "uint": "I", "float": "f",
           "double": "d", "int8": "b", "uint8": "B", "int16": "h", "uint16": "H", "int32": "i", "uint32": "I",
@@ -226,3 +227,16 @@ def test_a_coarse_surface_is_told_to_be_read_as_its_vertices(vertices: int, face
     words = [str(each.message) for each in caught]
     assert words == [each for each in words if "roof.ply: it is a surface, of which the 400 vertices" in each]
     assert len(words) == told
+
+
+def test_compressed_splats_are_told_with_what_unpacks_them():
+    # They were told to call their packed positions x, y and z.
+    fields = "".join(f"property uint packed_{each}\n" for each in ("position", "rotation", "scale", "color"))
+    head = f"ply\nformat binary_little_endian 1.0\nelement chunk 1\nproperty float min_x\nelement vertex 2\n{fields}"
+    for read in (
+        lambda: parse_ply(f"{head}end_header\n".encode() + bytes(36), "a.ply"),
+        lambda: parse_points(bytes(36), "a.splat"),
+        lambda: parse_points(bytes(36), "a.spz"),
+    ):
+        with pytest.raises(ValueError, match=r"convert it to a plain \.ply: splat-transform IN OUT\.ply"):
+            read()

@@ -231,7 +231,7 @@ ROWS = "1.5,2,3\n4,5,6\n7,8,9\n"
 FIRST_ROWS = {
     "its first row holds no numbers, so that it was read as the names of the columns: it has 0 fields called 'x' among "
     "'Rechtswert, Hochwert, Höhe'; name the coordinates": f"Rechtswert,Hochwert,Höhe\n{ROWS}",
-    "read as the names of the columns: it has 0 fields called 'x' among 'E, N, D'": f"E,N,D\n{ROWS}",
+    "read as the names of the columns: it has 0 fields called 'x' among 'A, N, D'": f"A,N,D\n{ROWS}",
     "its first 3000 rows hold no points, from 'key0: value' on; begin those that are comments with #": "".join(
         f"key{k}: value\n" for k in range(3000)
     )
@@ -240,6 +240,7 @@ FIRST_ROWS = {
     'its first row, "\' Trimble", is no comment': f"' Trimble\n{ROWS}",
     "its numbers are separated by ':': '1:2:3'": "1:2:3\n" * 30,
     "its numbers are separated by '|': '1.5|2|3'; separate them by": ROWS.replace(",", "|"),
+    "its numbers are separated by '|': '1.5|2|3'; separate them": "x|y|z\n" + ROWS.replace(",", "|"),
     "its numbers have separators of thousands: \"450'002.74;5'399'995.40;299.39\"; export them without": (
         "450'002.74;5'399'995.40;299.39\n" * 30
     ),
@@ -286,7 +287,7 @@ AMBIGUOUS = {
     "two heights": ("Easting,Northing,Height,Elevation", "0 fields called 'x'"),
     "two eastings": ("E,Easting,N,H", "0 fields called 'x'"),
     "no height": ("Easting,Northing,Code,Id", "0 fields called 'x'"),
-    "a depth, whose sign is open": ("Easting,Northing,Depth,Id", "0 fields called 'x'"),
+    "a depth, whose sign is open": ("Easting,Northing,Depth,Id", "'Depth' may count downwards"),
     "a box, not a height": ("x,y,width,height", "0 fields called 'z'"),
     "heights in feet on metres": ("Easting (m),Northing (m),Height (ft),Id", "differ: m, m, ft"),
     "a sensor's own frame beside": ("E,N,H,lidar_x,lidar_y,lidar_z", "several columns that could be"),

@@ -58,6 +58,12 @@ def parse_bin(data: bytes, name: str) -> NDArray[np.float64]:
     possible = [width for width in _WIDTHS if len(data) % (4 * width) == 0]
     likely, sure = _width_by_columns(data)
     told = likely if sure else 0
+    if not possible or (told and told not in possible):
+        # A radar's rows of seven in a number that no narrower rows divide.
+        numbers = np.frombuffer(data, dtype="<f4", count=len(data) // 4)
+        wide = wider(numbers, likely, _contrast) if len(data) % 4 == 0 else likely
+        if wide not in _WIDTHS:
+            return _points(_rows(data, wide), name)
     if told and told not in possible:
         problem = f"its numbers repeat after {told}, and its {len(data)} bytes are no multiple of {4 * told}"
         raise fault(name, problem, f"it was cut short, or has another layout: {_NO_HEADER}")
@@ -74,6 +80,10 @@ def parse_bin(data: bytes, name: str) -> NDArray[np.float64]:
     width = wider(numbers, width, _contrast)
     rows = _rows(data, width)
     rows = _rows(data, width * rows_together(rows))
+    return _points(rows, name)
+
+
+def _points(rows: NDArray[np.float32], name: str) -> NDArray[np.float64]:
     _refuse_implausible(rows, name)
     return stack_axes(rows[:, 0], rows[:, 1], rows[:, 2])
 

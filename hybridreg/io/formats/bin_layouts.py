@@ -17,6 +17,9 @@ _MANY = 500  # rows at which a width's contrast is hardly chance
 _LOOKED_AT = 120_000  # numbers
 # Contrast by which another width must win, and that of the parts of a file that are channels; by hand.
 _CLEARLY = 1.25
+_OVERWHELMINGLY = (
+    3.0  # of fewer rows: lasers stay below 1.8 by chance at 60 rows, radars of seven numbers above 6
+)
 _CHANNELS = 0.2
 _ALIKE = 1.05
 _WIDER = 20.0  # times as far across: no two halves of a scan, by hand
@@ -25,10 +28,13 @@ _WIDER = 20.0  # times as far across: no two halves of a scan, by hand
 def wider(numbers: Numbers, width: int, contrast: Contrast) -> int:
     """A width that explains the numbers clearly better than `width` of three to six; that, where none does."""
     some = numbers[:_LOOKED_AT]
-    least = max(_CLEARLY * contrast(some, width), _CHANNELS)
+    narrow = contrast(some, width)
     for wide in range(7, _WIDEST + 1):
-        fits = wide % width and len(numbers) % wide == 0 and len(some) >= _MANY * wide
-        if fits and contrast(some, wide) >= least:
+        rows = len(some) // wide
+        if not wide % width or len(numbers) % wide or rows < _FEWEST:
+            continue
+        least = (_CLEARLY if rows >= _MANY else _OVERWHELMINGLY) * narrow
+        if contrast(some, wide) >= max(least, _CHANNELS):
             return wide
     return width
 

@@ -21,6 +21,9 @@ _STRUCT_CODES = {"i1": "b", "u1": "B", "i2": "h", "u2": "H", "i4": "i", "u4": "I
 # Surfaces of fewer vertices are seldom dense; by hand, a tenth of the points that other formats' surfaces give. A cloud
 # of fewer points than the first is refused anyway.
 _FEWEST, _DENSE = 20, 20_000
+_PACKED = "packed_position"  # of SuperSplat's compressed files
+SPLATS = "convert it to a plain .ply: splat-transform IN OUT.ply (npm install @playcanvas/splat-transform)"
+"""What to do with compressed Gaussian splats."""
 _EXPORT_CLOUD = "export the file with x, y and z as single numbers of each vertex"
 
 
@@ -37,6 +40,8 @@ def parse_ply(data: bytes, name: str) -> NDArray[np.float64]:
 
 def _points(data: bytes, header: PlyHeader, name: str) -> NDArray[np.float64]:
     before, vertex = _split_at_vertex(header, name)
+    if any(field.name == _PACKED for field in vertex.properties):
+        raise fault(name, "holds compressed Gaussian splats, whose positions are packed", SPLATS)
     columns = axis_columns([field.name for field in vertex.properties], name)
     if any(vertex.properties[column].length_code for column in columns):
         raise fault(name, "x, y or z of its vertices is a list", _EXPORT_CLOUD)

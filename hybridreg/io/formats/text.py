@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from hybridreg.io.arrays import refuse_raw_las
 from hybridreg.io.column_names import Axes
 from hybridreg.io.faults import fault
-from hybridreg.io.formats.text_first_row import axes_of_first_row
+from hybridreg.io.formats.text_first_row import axes_of_first_row, below_names
 from hybridreg.io.formats.text_names import axes_in_comments, is_missing, is_number, names_in
 from hybridreg.io.formats.text_rows import parse_rows, text_lines, without_counts
 from hybridreg.io.meaning.beside_points import changes_points, with_what_is_beside
@@ -60,7 +60,10 @@ def parse_text(data: bytes, name: str) -> NDArray[np.float64]:
     delimiter, comma = _delimiter(_typical(rows))
     names = names_in(rows[0], delimiter)
     of_names = axes_of_first_row(rows, names, name) if names else None
-    rows = without_counts(rows[1:] if names else rows, name)
+    rows = rows[1:] if names else rows
+    if of_names is not None:
+        of_names, rows = below_names(of_names, names, rows, delimiter, name)
+    rows = without_counts(rows, name)
     width = len(rows[0].split(delimiter)) if rows else 0
     named = of_names or axes_in_comments(lines[:first], delimiter, width, name)
     if named is None:

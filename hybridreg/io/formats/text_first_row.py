@@ -8,7 +8,10 @@ from collections.abc import Sequence
 
 from hybridreg.io.column_names import Axes, axes_in
 from hybridreg.io.faults import fault, shorten
+from hybridreg.io.meaning.unit_words import ANGLES, known_metres
 
+_UNITS = ("unit", "units")  # what a column of units is called
+_AROUND = " \t\"'()[]"
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 _THREE = re.compile(rf"{_NUMBER}(?:[\s,;]+{_NUMBER}){{2}}")
 # Three numbers with another separator, or with Fortran's exponents of double precision.
@@ -35,13 +38,45 @@ def axes_of_first_row(rows: Sequence[str], names: Sequence[str], name: str) -> A
         raise (ValueError(f"{name}: {row} {told}") if "fields called" in told else error) from None
 
 
+def below_names(
+    axes: Axes, names: Sequence[str], rows: list[str], delimiter: str | None, name: str
+) -> tuple[Axes, list[str]]:
+    """x, y and z with the unit that a row below their names or a column `unit` gives, and the rows without such a row.
+
+    Raises
+    ------
+    ValueError
+        The units are angles, or differ.
+    """
+    cells = _cells(rows[0], delimiter) if rows else []
+    if len(cells) > max(axes.columns) and all(_is_unit(cells[k]) for k in axes.columns):
+        told = [f"{axis} ({cells[k]})" for axis, k in zip("xyz", axes.columns, strict=True)]
+        return Axes(axes.columns, axes_in(told, name).metres), rows[1:]
+    column = next((k for k, each in enumerate(names) if each.lower() in _UNITS), None)
+    if column is None or axes.metres is not None:
+        return axes, rows
+    said = {cells[column] for row in rows if len(cells := _cells(row, delimiter)) > column}
+    one = said.pop() if len(said) == 1 else ""
+    return Axes(axes.columns, known_metres(one)), rows
+
+
+def _cells(row: str, delimiter: str | None) -> list[str]:
+    return [cell.strip(_AROUND) for cell in row.split(delimiter)]
+
+
+def _is_unit(cell: str) -> bool:
+    return known_metres(cell) is not None or cell.lower() in ANGLES
+
+
 def _instead(rows: Sequence[str]) -> tuple[str, str]:
     """What the first row is and what to do about it; "" where it may be names."""
     row = rows[0]
-    mark = _OTHER_MARK.match(row)
+    mark = next(
+        filter(None, map(_OTHER_MARK.match, rows[:2])), None
+    )  # in the second where the first has names
     if mark:
         return (
-            f"its numbers are separated by {mark.group(1)!r}: {shorten(row)}",
+            f"its numbers are separated by {mark.group(1)!r}: {shorten(mark.string)}",
             "separate them by spaces or commas",
         )
     if _FORTRAN.match(row):

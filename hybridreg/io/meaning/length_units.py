@@ -33,7 +33,7 @@ def unit_given(x: Any, name: str) -> float | None:
 
 
 def one_unit(units: Iterable[float | None], name: str) -> float | None:
-    """The unit of x, y and z from that of each.
+    """The unit of x, y and z from that of each; without one it is the metre.
 
     Raises
     ------
@@ -41,10 +41,10 @@ def one_unit(units: Iterable[float | None], name: str) -> float | None:
         They differ.
     """
     each = list(units)
-    if len(set(each)) > 1:
+    if len({1.0 if metres is None else metres for metres in each}) > 1:
         told = ", ".join("none" if metres is None else f"{metres:g} m" for metres in each)
         raise fault(name, f"the units of its x, y and z differ: {told}", "give all three in one unit")
-    return each[0]
+    return next((metres for metres in each if metres is not None), None)
 
 
 def _words(x: Any) -> Iterator[str]:

@@ -22,10 +22,12 @@ _TIMES = re.compile(
     rf"()\b(?:multipl(?:y|ied)|divided?|scaled?)\b[\w ,]{{0,25}}?\bby\s+{_NUMBERS}(?![\w%])", _FLAGS
 )
 _OFFSET = re.compile(
-    rf"(?:([a-z]+)[ _-]+)?(?<![a-z])(?:offsets?|shift)(?:[ _-]?xyz)?{_IS}{_NUMBERS}(?![\w%])", _FLAGS
+    rf"(?:([a-z]+)[ _-]+)?(?:(?:(?<![a-z])|(?<=global))(?:offsets?|shift)(?:[ _-]?xyz)?|"
+    rf"(?<![a-z])(?:local|map|world|project|utm)[ _-]?origin){_IS}{_NUMBERS}(?![\w%])",
+    _FLAGS,
 )
 _MAYBE = re.compile(
-    r"scal|quantiz|multipl|divide|offset|shift", _FLAGS
+    r"scal|quantiz|multipl|divide|offset|shift|origin", _FLAGS
 )  # a quick look at what is mostly prose
 # What else has a scale or an offset.
 _OF_OTHERS = (

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from hybridreg.io.coordinate_systems.length_unit import LengthUnit, in_metres, tell_stretch
 from hybridreg.io.coordinate_systems.well_known_text import unit_of_text
 from hybridreg.io.faults import shorten
+from hybridreg.io.meaning.downward import tell_downward_comments
 from hybridreg.io.meaning.scale_comments import tell_scale
 from hybridreg.io.meaning.unit_words import ANGLES, CELLS, MULTIPLE, has_unit, metres_of, tell_cells
 
@@ -96,6 +97,7 @@ def as_commented(points: Array, comments: Iterable[str], name: str, said: float 
     """
     lines = [line if _SYSTEM.search(line) else line[:_LONGEST] for line in comments]
     tell_scale(lines, name)
+    tell_downward_comments(lines, name)
     if said is not None:
         return in_metres(points, said, name)
     unit = unit_in(lines, name)

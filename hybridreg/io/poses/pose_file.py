@@ -10,8 +10,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from hybridreg.io.coordinate_systems.length_unit import in_metres
 from hybridreg.io.faults import fault, shorten
 from hybridreg.io.formats.npy import array_of_npy
+from hybridreg.io.meaning.length_units import unit_given
 from hybridreg.io.poses.pose_from_text import pose_of_text
 from hybridreg.io.poses.pose_numbers import EXPECTED, pose_of_numbers
 from hybridreg.io.signatures import kind_of, looks_binary
@@ -36,7 +38,10 @@ def read_pose(path: str | os.PathLike[str]) -> NDArray[np.float64]:
     """
     name = os.fspath(path)
     if name.lower().endswith(".json"):
-        return pose_of_numbers(_of_json(read_json(path), name), name)
+        values = read_json(path)
+        T = pose_of_numbers(_of_json(values, name), name)
+        T[:3, 3] = in_metres(T[None, :3, 3], unit_given(values, name), name)[0]
+        return T
     data = read_whole(Path(path))
     if data.startswith(_NPY):
         return pose_of_numbers(array_of_npy(data, name), name)

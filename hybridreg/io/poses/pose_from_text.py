@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybridreg.io.faults import fault
+from hybridreg.io.meaning.unit_comments import as_commented
 from hybridreg.io.poses.pose_names import in_order
 from hybridreg.io.poses.pose_numbers import ONE_POSE, number_of, pose_of_angles, pose_of_numbers
 from hybridreg.io.poses.ros_publisher import PUBLISHER, pose_of_publisher
@@ -18,7 +19,11 @@ Array = NDArray[np.float64]
 
 _COMMENTS = ("#", "//", "%")
 _ORIGIN = re.compile(r"<origin\b([^>]*)>")
-_NUMBERS = re.compile(r"\d|\bnan\b", re.IGNORECASE)
+# A row has numbers of its own, not only names that end in one, such as `q0`.
+_NUMBERS = re.compile(r"(?<![\w.])[-+]?\.?\d|\bnan\b", re.IGNORECASE)
+_MARKS = "#/% \t"
+# Comments that are about its angles, whose unit is none of length.
+_TURNS = re.compile(r"rot|angle|quat|euler|roll|yaw|rpy|orient|heading|\bdeg|\brad", re.IGNORECASE)
 _BRACKETS = str.maketrans("[](){}", "      ")
 
 
@@ -40,7 +45,13 @@ def pose_of_text(text: str, name: str) -> Array:
     full = [k for k, line in enumerate(lines) if not line.startswith(_COMMENTS) and _NUMBERS.search(line)]
     rows = [[number_of(word, name) for word in lines[k].split()] for k in full]
     named = in_order(rows[0], text.splitlines()[: full[0]], name) if len(rows) == 1 else None
-    return pose_of_numbers(_as_rows(rows) if named is None else named, name)
+    T = pose_of_numbers(_as_rows(rows) if named is None else named.numbers, name)
+    if named is None or not named.has_unit:
+        comments = [line.strip(_MARKS) for line in text.splitlines() if line.strip().startswith(_COMMENTS)]
+        T[:3, 3] = as_commented(T[None, :3, 3], [each for each in comments if not _TURNS.search(each)], name)[
+            0
+        ]
+    return T
 
 
 def _spaced(text: str) -> str:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybridreg.io.faults import fault, foreign_parser
+from hybridreg.io.meaning.unit_comments import as_commented
 from hybridreg.io.recorded.gltf_positions import check_positions
 from hybridreg.io.recorded.recording import Recorded, Selection
 from hybridreg.runtime.optional_packages import load
@@ -19,11 +20,13 @@ Array = NDArray[np.float64]
 # Points of a mesh: some hundreds on each of the cells that a default voxel leaves of it.
 _SAMPLES = 200_000
 _VERTEX = re.compile(rb"^v[ \t]", re.MULTILINE)
+_HEAD, _STL = 16_384, 80  # bytes looked at for comments, and those of a binary STL's title
 NO_PLACE = np.zeros((0, 3))
 
 
 def read_mesh(path: Path, selection: Selection) -> Recorded:
-    """Read a `.obj`, `.stl`, `.off`, `.glb` or `.gltf` file, in its own frame and unit.
+    """Read a `.obj`, `.stl`, `.off`, `.glb` or `.gltf` file, in its own frame; in metres where a comment or the title
+    of an STL gives another unit, as those of 3ds Max and SketchUp do.
 
     A mesh gives 200,000 points drawn evenly over its area, always the same; a file without faces its own points. A mesh
     was seen by nobody, so that free space is not tested. glTF's y axis points up: say `gravity=` if you compare it
@@ -54,10 +57,21 @@ def read_mesh(path: Path, selection: Selection) -> Recorded:
     if meshes:
         every = max(sum(held), _vertices_of_obj(path))
         refuse_loose(sum(clouds) or every - sum(used), 0 if clouds else every, name)
-        return Recorded(spread_over(triangles, name), NO_PLACE)
+        return Recorded(as_commented(spread_over(triangles, name), _comments(path), name), NO_PLACE)
     if not points:
         raise fault(name, "holds neither faces nor points", "export it with its geometry")
-    return Recorded(np.vstack(points))
+    return Recorded(as_commented(np.vstack(points), _comments(path), name))
+
+
+def _comments(path: Path) -> list[str]:
+    suffix = path.suffix.lower()
+    if suffix not in (".obj", ".off", ".stl"):
+        return []
+    with open(path, "rb") as file:
+        head = file.read(_HEAD).decode("latin-1")
+    if suffix == ".stl":
+        return [(head.splitlines()[0] if head.startswith("solid") else head[:_STL]).strip("\0 ")]
+    return [line.strip("# \t") for line in head.splitlines() if line.startswith("#")]
 
 
 def refuse_loose(loose: int, every: int, name: str) -> None:

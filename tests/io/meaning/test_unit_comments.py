@@ -87,6 +87,9 @@ def test_prose_changes_nothing_and_alarms_nobody(comment: str) -> None:
         ("quantization: 0.001", "'quantization: 0.001'"),
         ("global shift 400000 5000000 0", "are to be shifted by that"),
         ("offset: -1,2,3", "'offset: -1,2,3'"),
+        ("GlobalShift: -500000 -5400000 0", "Shift: -500000 -5400000 0"),
+        ("local origin (500000, 5400000, 0)", "local origin (500000, 5400000, 0"),
+        ("global shift = [500000.0, 5400000.0, 0.0]", "shift = [500000.0, 5400000.0, 0.0"),
     ],
 )
 def test_what_may_be_meant_of_the_coordinates_is_told(comment: str, words: str) -> None:
@@ -149,3 +152,28 @@ def test_metres_in_the_names_are_believed_against_a_comment() -> None:
 def test_endless_comments_take_no_time() -> None:
     for part in (":", "values ", "scale ", "( ", "in ", "x y "):
         text(part * 20_000)
+
+
+@pytest.mark.parametrize(
+    "head, mark, end",
+    [
+        ("x,y,z\nmm,mm,mm", ",", ""), ("X;Y;Z\n[mm];[mm];[mm]", ";", ""), ("x y z i\n(mm) (mm) (mm) -", " ", " 7"),
+        ("x,y,z,unit", ",", ",mm"), ('x,y,z,Units', ",", ', "mm"'), ("Easting,Northing,Height\nmm,mm,mm", ",", ""),
+    ],
+)  # fmt: skip
+def test_a_row_or_a_column_of_units(head: str, mark: str, end: str) -> None:
+    # The row was said to be damaged: without it, the numbers were metres.
+    rows = np.random.default_rng(0).integers(-9000, 9000, (40, 3))
+    lines = "\n".join(mark.join(f"{each}.5" for each in row) + end for row in rows)
+    with pytest.warns(UserWarning, match=r"its unit is 0\.001 m; it was read in metres"):
+        found = parse_text(f"{head}\n{lines}\n".encode(), "a.csv")
+    expected = np.sign(rows) * (np.abs(rows) + 0.5) / 1000 + 0.001 * (rows == 0) * 0.5
+    np.testing.assert_allclose(found, expected, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    "units, message", [("deg,deg,m", "'deg'"), ("m,m,ft", "differ: m, m, ft"), ("rad,rad,rad", "'rad'")]
+)
+def test_rows_of_units_that_cannot_be(units: str, message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        parse_text(f"x,y,z\n{units}\n".encode() + b"1,2,3\n" * 30, "a.csv")

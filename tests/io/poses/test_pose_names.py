@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: MIT
 from __future__ import annotations
 
+import json
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -42,16 +44,39 @@ EUROC = (
         f"%time x y z ori_w ori_x ori_y ori_z\n0 {T} {WXYZ}",
         f"# x [m], y [m], z [m], qw [], qx [], qy [], qz []\n{T} {WXYZ}",
         f"# x y z qw qx qy qz (metres, map)\n{T} {WXYZ}",
+        # Other names of the parts, and words that name no column but the order.
+        f"x y z qr qi qj qk\n{T} {WXYZ}",
+        f"tx ty tz qs qx qy qz\n{T} {WXYZ}",
+        f"# x y z real i j k\n{T} {WXYZ}",
+        f"# tx,ty,tz,q_i,q_j,q_k,q_r\n{T} {Q}",
+        f"# position (x, y, z), quaternion (w, x, y, z)\n{T} {WXYZ}",
+        f"# position and quaternion, scalar first\n{T} {WXYZ}",
+        f"# time xyz wxyz\n0 {T} {WXYZ}",
+        f"# x y z w x y z\n{T} {WXYZ}",
         # Names that do not say which columns these are leave what seven numbers are without names.
-        f"# x y z w x y z\n{T} {Q}",
+        f"# xyz xyzw, scalar last\n{T} {Q}",
         f"# from the source to the target, seven numbers\n{T} {Q}",
-        f"# x y z q1 q2 q3 q4\n{T} {Q}",
     ],
 )
 def test_names_of_the_columns_say_where_w_stands(tmp_path: Path, text: str) -> None:
     # Read as x y z w they gave another rotation, without a word.
     path = tmp_path / "pose.txt"
     path.write_text(text)
+    np.testing.assert_allclose(read_pose(path), POSE, rtol=0, atol=1e-14)
+
+
+@pytest.mark.parametrize(
+    "names", ["# x y z q1 q2 q3 q4", "x,y,z,q0,q1,q2,q3", "% time x y z quat_0 quat_1 quat_2 quat_3"]
+)
+def test_counted_parts_of_a_quaternion_are_refused(tmp_path: Path, names: str) -> None:
+    # Robots of ABB and autopilots have w first, others last: read as w last they gave another rotation.
+    path = tmp_path / "pose.txt"
+    path.write_text(f"{names}\n{'0 ' if 'time' in names else ''}{T} {WXYZ}\n")
+    with pytest.raises(
+        ValueError, match="do not say which part of the quaternion is w; call them x y z qx qy qz qw"
+    ):
+        read_pose(path)
+    path.write_text(f"# x y z qw qx qy qz\n{T} {WXYZ}\n")
     np.testing.assert_allclose(read_pose(path), POSE, rtol=0, atol=1e-14)
 
 
@@ -78,3 +103,33 @@ def test_named_columns_that_hold_no_rotation_are_refused(tmp_path: Path) -> None
     path.write_text(f"# x y z qw qx qy qz\n{T} {WXYZ}\n{T} {WXYZ}\n")
     with pytest.raises(ValueError, match="holds 2 poses"):
         read_pose(path)
+
+
+IN_MM = POSE.copy()
+IN_MM[:3, 3] *= 1000.0
+
+
+@pytest.mark.parametrize(
+    "name, text",
+    [
+        ("a.txt", f"# unit: mm\n# angles in degrees\n4000 -5500 250 {Q}"),
+        ("a.txt", f"# all values in mm\n# x y z qw qx qy qz\n4000 -5500 250 {WXYZ}"),
+        ("a.txt", "% units: mm\n" + "\n".join(" ".join(map(repr, row)) for row in IN_MM.tolist())),
+        ("a.json", json.dumps({"unit": "mm", "T": IN_MM.tolist()})),
+    ],
+)
+def test_a_comment_or_an_entry_gives_the_unit(tmp_path: Path, name: str, text: str) -> None:
+    # Without a word the pose was a thousand times too far.
+    path = tmp_path / name
+    path.write_text(text)
+    with pytest.warns(UserWarning, match=r"its unit is 0\.001 m; it was read in metres"):
+        found = read_pose(path)
+    np.testing.assert_allclose(found, POSE, rtol=0, atol=1e-12)
+
+
+def test_comments_about_angles_and_metres_change_nothing(tmp_path: Path) -> None:
+    path = tmp_path / "a.txt"
+    path.write_text(f"# unit: m\n# rotation as a quaternion, unit length\n# angles: 30 deg, 2 rad\n{T} {Q}")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        np.testing.assert_allclose(read_pose(path), POSE, rtol=0, atol=1e-14)
