@@ -20,14 +20,13 @@ from hybridreg.io.meaning.downward import tell_downward
 from hybridreg.io.meaning.first_column import FEWEST
 from hybridreg.io.meaning.image_shapes import refuse_image
 from hybridreg.io.meaning.length_units import one_unit, unit_given
-from hybridreg.io.meaning.unit_words import known_metres
+from hybridreg.io.meaning.unit_words import column_of_units, known_metres
 from hybridreg.io.record_fields import stack_axes
 
 Array = NDArray[np.float64]
 
 # What pandas, polars and pyarrow call the columns of a file without names.
 _WIDEST = 6  # numbers a point: x, y, z and what sensors add
-_UNITS = ("unit", "units")  # what a column of units is called
 _UNNAMED = re.compile(r"(column_?|f|v|_)?\d+", re.IGNORECASE)
 
 
@@ -125,11 +124,11 @@ def _unit(x: Any, columns: tuple[int, int, int], names: list[Any], name: str) ->
         return unit_given(x.schema, name) if said is None else said
     said = one_unit((unit_given(_column(x, k, names), name) for k in columns), name)
     said = unit_given(x, name) if said is None else said
-    column = next((k for k, each in enumerate(names) if str(each).lower() in _UNITS), None)
+    column = column_of_units([str(each) for each in names])
     if said is not None or column is None or isinstance(x, Mapping):
         return said
-    words = set(_objects(_column(x, column, names)).tolist())
-    return known_metres(str(words.pop())) if len(words) == 1 else None
+    words = {str(word) for word in _objects(_column(x, column, names)).tolist()}
+    return one_unit(map(known_metres, words), name)
 
 
 def _along(x: Any) -> Any:

@@ -8,9 +8,9 @@ from collections.abc import Sequence
 
 from hybridreg.io.column_names import Axes, axes_in
 from hybridreg.io.faults import fault, shorten
-from hybridreg.io.meaning.unit_words import ANGLES, known_metres
+from hybridreg.io.meaning.length_units import one_unit
+from hybridreg.io.meaning.unit_words import ANGLES, column_of_units, known_metres
 
-_UNITS = ("unit", "units")  # what a column of units is called
 _AROUND = " \t\"'()[]"
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 _THREE = re.compile(rf"{_NUMBER}(?:[\s,;]+{_NUMBER}){{2}}")
@@ -52,12 +52,11 @@ def below_names(
     if len(cells) > max(axes.columns) and all(_is_unit(cells[k]) for k in axes.columns):
         told = [f"{axis} ({cells[k]})" for axis, k in zip("xyz", axes.columns, strict=True)]
         return Axes(axes.columns, axes_in(told, name).metres), rows[1:]
-    column = next((k for k, each in enumerate(names) if each.lower() in _UNITS), None)
+    column = column_of_units(names)
     if column is None or axes.metres is not None:
         return axes, rows
     said = {cells[column] for row in rows if len(cells := _cells(row, delimiter)) > column}
-    one = said.pop() if len(said) == 1 else ""
-    return Axes(axes.columns, known_metres(one)), rows
+    return Axes(axes.columns, one_unit(map(known_metres, said), name)), rows
 
 
 def _cells(row: str, delimiter: str | None) -> list[str]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import re
 import warnings
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 from hybridreg.io.faults import fault, shorten
 
@@ -74,6 +74,11 @@ def known_metres(word: str) -> float | None:
         return None
     metres = _METRES.get(_BETWEEN.sub("", unit))
     return metres * factor if metres is not None and 0.0 < factor < float("inf") else None
+
+
+def column_of_units(names: Sequence[str]) -> int | None:
+    """Which of some columns says the unit of each row, if any."""
+    return next((k for k, each in enumerate(names) if each.lower() in ("unit", "units")), None)
 
 
 def metres_of(word: str, name: str) -> float | None:

@@ -63,5 +63,13 @@ def test_a_column_of_units() -> None:
     table = pd.DataFrame(P * 1000.0, columns=list("xyz")).assign(unit="mm")
     with pytest.warns(UserWarning, match=r"its unit is 0\.001 m; it was read in metres"):
         np.testing.assert_allclose(PointCloud.of(table).points, P, rtol=0, atol=1e-12)
-    mixed = table.assign(unit=["mm", "m"] * 30)
-    np.testing.assert_allclose(PointCloud.of(mixed).points, P * 1000.0)
+
+
+@pytest.mark.parametrize("text", [False, True])
+def test_rows_in_different_units_are_refused(tmp_path: Path, text: bool) -> None:
+    given = pd.DataFrame(P, columns=list("xyz")).assign(unit=["mm", "m"] * 30)
+    if text:
+        given.to_csv(tmp_path / "p.csv", index=False)
+        given = tmp_path / "p.csv"
+    with pytest.raises(ValueError, match="unit"):
+        PointCloud.of(given)
