@@ -20,10 +20,10 @@ from hybridreg.search.hypothesis import Hypothesis
 
 Array = NDArray[np.float64]
 
-# Of a rival: points off the commonest surface that agree, at least; those that are seen through, as a share of these,
-# and all that are seen through, as a share of the visible, at most; nats per point closer than by chance, at least. By
-# hand: of eight real pairs of sensors on one vehicle, poses a few metres aside come near only one or two of these.
-_AGREE, _THROUGH_RARE, _THROUGH, _CLOSELY = 60, 0.65, 0.1, 0.4
+# Of a rival: points off the commonest surface that agree, at least; those that are seen through, as a share of these
+# and of the visible, and of all that are visible, at most; nats per point closer than by chance, at least. By hand: of
+# eight real pairs of sensors on one vehicle, poses a few metres aside come near only one or two of these.
+_AGREE, _OF_AGREEING, _OF_RARE, _OF_ALL, _CLOSELY = 60, 0.65, 0.15, 0.1, 0.4
 
 
 class Rivalled(NamedTuple):
@@ -46,10 +46,10 @@ def rivalled(at: PoseEvidence, found: list[Hypothesis]) -> Rivalled | None:
 
 
 def _uncontradicted(at: PoseEvidence) -> bool:
-    _, agreed, through = at.agreement.rare
+    looked, agreed, through = at.agreement.rare
     return (
         agreed > _AGREE
-        and through < _THROUGH_RARE * agreed
-        and at.agreement.looked_through < _THROUGH
+        and through < min(_OF_AGREEING * agreed, _OF_RARE * looked)
+        and at.agreement.looked_through < _OF_ALL
         and at.closeness > _CLOSELY
     )
