@@ -363,9 +363,12 @@ def test_a_matrix_of_numpy_or_json_is_read(tmp_path: Path) -> None:
     [
         ("T: [1, 0, 0, 6]", "holds 'T:' where a number of a pose is needed; write a pose as four lines"),
         ("1.0 0 0 0\n0 1 0 0", "holds 8 numbers; write a pose"),
-        ("1 2 3 0 0 14", "holds 6 numbers; write a pose as four lines"),
+        ("1 2 3 0 0 14", "holds 6 numbers; where they are x y z roll pitch yaw in radians, write <origin"),
         ("1 2 3 0 0 0 9", "have the length 9, a quaternion has 1"),
-        ("1 0 0\n0 1 0\n0 0 1\n5 6 7", "holds four rows of three numbers; transpose it"),
+        (
+            "1 0 0\n0 1 0\n0 0 1\n5 6 7",
+            "holds four rows of three numbers; write three rows of four, with the last row",
+        ),
         ("static_transform_publisher --x 1 --yaw 2 --qw 1", "has a quaternion and --yaw; keep one of them"),
         ("static_transform_publisher --x 1 --qz 1", "have the length 1.414, a quaternion has 1"),
         ("static_transform_publisher --x one", "holds 'one' where a number of a pose is needed"),
@@ -381,6 +384,43 @@ def test_text_that_is_no_pose_is_refused_with_what_is_expected(tmp_path: Path, t
     (tmp_path / "pose.txt").write_text(text)
     with pytest.raises(ValueError, match=re.escape(words)):
         read_pose(tmp_path / "pose.txt")
+
+
+@pytest.mark.parametrize(
+    "parts",
+    [
+        {"translation": [1, 2, 3], "rotation": [1, 0, 0, 0]},
+        {"position": {"x": 1}, "orientation": {"w": 1}},
+        {"R": np.eye(3).tolist(), "t": [1, 2, 3]},
+    ],
+)
+def test_a_pose_in_parts_is_told_in_which_order_they_are_given(tmp_path: Path, parts: dict[str, Any]) -> None:
+    path = tmp_path / "pose.json"
+    path.write_text(json.dumps(parts))
+    with pytest.raises(
+        ValueError, match=r'give "T_target_source": \[x, y, z, qx, qy, qz, qw\], w last'
+    ) as caught:
+        read_pose(path)
+    numbers = str(caught.value).split('"T_target_source": ')[1].split("]")[0]
+    for word, value in zip(("qx", "qy", "qz", "qw", "x", "y", "z"), (0, 0, 0, 1, 4, 5, 6), strict=True):
+        numbers = numbers.replace(word, str(value), 1)
+    path.write_text(f'{{"T_target_source": {numbers}]}}')
+    np.testing.assert_array_equal(read_pose(path)[:3], [[1, 0, 0, 4], [0, 1, 0, 5], [0, 0, 1, 6]])
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_the_cure_for_a_translation_below_the_rotation_gives_the_pose(tmp_path: Path, turned: bool) -> None:
+    # "Transpose it" gave the inverse rotation for R with t below.
+    R, t = TURNED[:3, :3], TURNED[:3, 3]
+    np.savetxt(tmp_path / "pose.txt", np.vstack([R.T if turned else R, t]))
+    with pytest.raises(
+        ValueError, match=r"at their ends; .*, as in MATLAB's affine3d, transpose the rotation"
+    ):
+        read_pose(tmp_path / "pose.txt")
+    rows = np.loadtxt(tmp_path / "pose.txt")
+    rotation = rows[:3].T if turned else rows[:3]
+    np.savetxt(tmp_path / "pose.txt", np.column_stack([rotation, rows[3]]))
+    np.testing.assert_allclose(read_pose(tmp_path / "pose.txt"), TURNED, rtol=0, atol=1e-12)
 
 
 @pytest.mark.parametrize("held", ["transformation", "T_target_source", "homogeneous", "transform_matrix"])

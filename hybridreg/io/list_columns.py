@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybridreg.io.arrays import together_in
-from hybridreg.io.coordinate_systems.length_unit import in_metres
+from hybridreg.io.coordinate_systems.geo_columns import coordinates_of, unit_of_schema
+from hybridreg.io.coordinate_systems.length_unit import LengthUnit, in_metres
 from hybridreg.io.faults import fault, shorten
 
 Array = NDArray[np.float64]
@@ -56,8 +57,13 @@ def without_records(x: Any, name: str) -> Any:
         return x
     told = (x.schema.metadata or {}).get(b"geo")
     if told is not None and "binary" in kinds.values() and b'"WKB"' in told:
-        cure = "give geopandas.read_parquet(path).get_coordinates(include_z=True)"
-        raise fault(name, "its points are geometries in binary (WKB)", cure)
+        give = coordinates_of("x", unit_of_schema(x.schema) or LengthUnit())
+        how = "read_feather" if name.lower().endswith((".feather", ".arrow")) else "read_parquet"
+        raise fault(
+            name,
+            "its points are geometries in binary (WKB)",
+            f"give {give} of x = geopandas.{how}(path)",
+        )
     return x.flatten() if any(kind.startswith("struct") for kind in kinds.values()) else x
 
 

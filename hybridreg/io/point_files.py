@@ -50,7 +50,8 @@ _ELSEWHERE = {
     ".pvtp": "it names pieces in other files: give one of those, or save all as one .vtp",
     ".mat": "save the array in it as .csv or .npy",
     **dict.fromkeys(
-        (".h5", ".hdf5", ".nc", ".zarr", ".pkl", ".pickle", ".pt", ".pth"), "save the array in it as .npy"
+        (".h5", ".hdf5", ".hdf", ".nc", ".nc4", ".zarr", ".pkl", ".pickle", ".pt", ".pth"),
+        "save the array in it as .npy",
     ),
     **dict.fromkeys((".splat", ".spz", ".ksplat", ".sog"), SPLATS),
     **dict.fromkeys(
@@ -58,14 +59,25 @@ _ELSEWHERE = {
         "export it as .e57 with the scanner's own program",
     ),
     **dict.fromkeys((".tif", ".tiff"), "if it holds heights: gdal_translate -of XYZ IN out.xyz"),
+    # Mostly in degrees, GeoJSON and KML always.
     **dict.fromkeys(
-        (".gpkg", ".shp", ".geojson"), "convert it: ogr2ogr -f CSV out.csv IN -lco GEOMETRY=AS_XYZ"
+        (".gpkg", ".shp", ".geojson", ".gml", ".kml", ".kmz", ".fgb"),
+        "convert it: ogr2ogr -f CSV -t_srs EPSG:CODE out.csv IN -lco GEOMETRY=AS_XYZ, with the code of a system in "
+        "metres, such as EPSG:32632 of UTM's zone 32 north",
     ),
+    **dict.fromkeys((".json", ".tfrecord", ".rrd"), "save the points of one cloud in it as .npy or .csv"),
+    **dict.fromkeys(
+        (".svo", ".svo2", ".mkv", ".oni", ".r3d"),
+        "save one frame's points, unprojected from its depths, as .ply or .npy",
+    ),
+    ".zdf": "save it as .ply or .pcd with the camera's own program",
     ".drc": "decode it: draco_decoder -i in.drc -o out.ply",
     ".active": "its recording was cut off: run `rosbag reindex` on it, and rename it to end in .bag",
     ".zstd": "of a ROS 2 bag give the folder, unpack anything else first",
     ".yaml": "of a ROS 2 bag give the folder",
-    **dict.fromkeys((".gz", ".bz2", ".xz", ".zip", ".7z", ".tar", ".tgz"), "unpack it first"),
+    **dict.fromkeys(
+        (".gz", ".bz2", ".xz", ".zst", ".lz4", ".zip", ".7z", ".rar", ".tar", ".tgz"), "unpack it first"
+    ),
 }
 
 Parser = Callable[[bytes, str], NDArray[np.float64]]

@@ -13,8 +13,9 @@ from numpy.typing import NDArray
 
 from hybridreg.io import tables
 from hybridreg.io.arrays import array_points, together_in
+from hybridreg.io.coordinate_systems.geo_columns import coordinates_of, unit_of_frame, unit_of_schema
 from hybridreg.io.coordinate_systems.las_extended import records_of_header
-from hybridreg.io.coordinate_systems.las_units import metres_of_las
+from hybridreg.io.coordinate_systems.las_units import metres_of_las, metres_of_system
 from hybridreg.io.coordinate_systems.length_unit import in_metres
 from hybridreg.io.formats.las_withheld import without_withheld
 from hybridreg.io.list_columns import listed_points, without_records
@@ -35,6 +36,7 @@ _VERTICES = {
 }
 _DEEPEST = 3
 _TRIANGLE = 3  # corners
+_PROJECT = "project them to metres first, for example with geopandas: x.to_crs(x.estimate_utm_crs())"
 _CURE = "pass an array of shape (N, 3), such as numpy.column_stack([x, y, z])"
 
 
@@ -108,18 +110,19 @@ def _from_table(x: Any, names: list[Any], name: str, depth: int) -> Array:
         if callable(getattr(x, first, None)) and not hasattr(x, "data_vars") and not hasattr(x, "dims"):
             _refuse(x, name, f"it is not computed yet; pass what its {first}() returns")
     if "geometry" in names and hasattr(x, "get_coordinates"):
-        _refuse(x, name, "pass x.get_coordinates(include_z=True)")
+        _refuse(x, name, f"pass {coordinates_of('x', unit_of_frame(x))}")
     if depth < _DEEPEST and isinstance(x, Mapping):
         found = together_in(names) or ((names.index("arr_0"), None) if "arr_0" in names else None)
         if found is not None:
             return _entry(x, names[found[0]], found[1], name, depth)
+    system = None
     if hasattr(x, "schema") and hasattr(x, "flatten"):
+        system = unit_of_schema(x.schema)
         x = without_records(x, name)
         names = list(x.schema.names)
     listed = None if isinstance(x, Mapping) else listed_points(x, names, name)
-    if listed is not None:
-        return _from_array(listed, name)
-    return tables.points(x, names, name)
+    points = _from_array(listed, name) if listed is not None else tables.points(x, names, name)
+    return points if system is None else metres_of_system(points, system, name, _PROJECT)
 
 
 def _entry(x: Mapping[Any, Any], key: Any, metres: float | None, name: str, depth: int) -> Array:

@@ -114,6 +114,9 @@ def attributes_beside(x: Any) -> dict[str, Any]:
 def _attributes(x: Any) -> Mapping[Any, Any]:
     # As NetCDF and HDF5 keep them: xarray's and h5py's; pandas has them too.
     attributes = getattr(x, "attrs", None)
+    # netCDF4's variables, which multiply by their scale themselves unless they were told not to.
+    if callable(getattr(x, "ncattrs", None)) and not getattr(x, "scale", True):
+        return {each: x.getncattr(each) for each in x.ncattrs()}
     return attributes if isinstance(attributes, Mapping) else {}
 
 

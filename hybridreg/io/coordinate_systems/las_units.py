@@ -17,6 +17,8 @@ from hybridreg.io.faults import fault
 
 Array = NDArray[np.float64]
 
+_PROJECT = "project them to metres first, for example with PDAL's filters.reprojection"
+
 WELL_KNOWN_TEXT = 2112
 """The id of the record that holds a system's well-known text."""
 
@@ -29,9 +31,19 @@ def metres_of_las(points: Array, records: Iterable[Any], name: str) -> Array:
     ValueError
         x and y are longitude and latitude.
     """
-    unit = told(records)
+    return metres_of_system(points, told(records), name)
+
+
+def metres_of_system(points: Array, unit: LengthUnit, name: str, project: str = _PROJECT) -> Array:
+    """The points (N, 3) of a coordinate reference system with that unit, in metres; `project`: how degrees are left.
+
+    Raises
+    ------
+    ValueError
+        x and y are longitude and latitude.
+    """
     if unit.degrees and len(points):
-        _check_degrees(points, name)
+        _check_degrees(points, name, project)
     if unit.unknown:
         _warn(
             f"{name}: its coordinate system, {unit.unknown}, gives no unit that is known here; what it does not give "
@@ -59,11 +71,10 @@ def told(records: Iterable[Any]) -> LengthUnit:
     return LengthUnit()
 
 
-def _check_degrees(points: Array, name: str) -> None:
+def _check_degrees(points: Array, name: str, project: str) -> None:
     # A geographic system on projected coordinates is a common slip.
     if (np.abs(points[:, :2]).max(axis=0) <= (360.0, 90.0)).all():
-        cure = "project them to metres first, for example with PDAL's filters.reprojection"
-        raise fault(name, "its x and y are longitude and latitude in degrees", cure)
+        raise fault(name, "its x and y are longitude and latitude in degrees", project)
     _warn(
         f"{name}: its header says longitude and latitude, its x and y cannot be; they were taken for metres"
     )

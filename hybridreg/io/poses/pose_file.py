@@ -22,6 +22,9 @@ from hybridreg.io.whole_files import read_whole
 
 # What the field, the library's own results among them, calls a pose in JSON.
 _KEYS = ("T_target_source", "transformation", "T")
+# Where it is in parts: of nuScenes, whose quaternions have w first, of ROS and of others.
+_PLACES = ("translation", "position", "t")
+_SEVEN = '"T_target_source": [x, y, z, qx, qy, qz, qw]'
 _NPY = b"\x93NUMPY"
 
 
@@ -62,5 +65,7 @@ def _of_json(values: Any, name: str) -> Any:
         raise fault(name, "its T_source_target maps target points to source points", cure)
     if found is None:
         problem = f"has no entry {' or '.join(_KEYS)} among {shorten(', '.join(values), 200)}"
-        raise fault(name, problem, "call the matrix, four rows of four numbers, T_target_source")
+        matrix = "call the matrix, four rows of four numbers, T_target_source"
+        apart = any(str(key).lower() in _PLACES for key in values)
+        raise fault(name, problem, f"give {_SEVEN}, w last, or {matrix}" if apart else matrix)
     return values[found]

@@ -24,6 +24,8 @@ _NUMBERS = re.compile(r"(?<![\w.])[-+]?\.?\d|\bnan\b", re.IGNORECASE)
 _MARKS = "#/% \t"
 # Comments that are about its angles, whose unit is none of length.
 _TURNS = re.compile(r"rot|angle|quat|euler|roll|yaw|rpy|orient|heading|\bdeg|\brad", re.IGNORECASE)
+# Open3D 0.20.0 ends the comment on top of its TUM files by no line break: the first pose stands behind the last name.
+_GLUED = re.compile(r"^([ \t]*#.*<q[wxyz]>)(?=[-+.\d])", re.MULTILINE)
 _BRACKETS = str.maketrans("[](){}", "      ")
 
 
@@ -37,6 +39,7 @@ def pose_of_text(text: str, name: str) -> Array:
     ValueError
         Several poses, no pose, or as `pose_of_numbers`.
     """
+    text = _GLUED.sub(r"\1\n", text)
     if PUBLISHER in text:
         return pose_of_publisher(text, name)
     if "<origin" in text or "<robot" in text:

@@ -19,9 +19,18 @@ EXPECTED = "write a pose as four lines of four numbers, or as one line: x y z qx
 ONE_POSE = "keep the one from the source to the target"
 """What to do with a file of several."""
 
+# The last row is the translation either way; above it stands the rotation, or its transpose.
+_BELOW = (
+    "write three rows of four, with the last row's numbers at their ends; where points are rows that stand before the "
+    "matrix, as in MATLAB's affine3d, transpose the rotation, else leave it"
+)
 # How far a quaternion that was written with few digits may be from length 1; by hand.
 _ROUNDED = 0.03
-_MATRIX, _QUATERNION, _TIMED = (12, 16), 7, 8
+_MATRIX, _QUATERNION, _TIMED, _SIX = (12, 16), 7, 8, 6
+_ANGLES = (
+    'where they are x y z roll pitch yaw in radians, write <origin xyz="x y z" rpy="roll pitch yaw"/> in their place; '
+    "else " + EXPECTED
+)
 
 
 def pose_of_numbers(values: Any, name: str) -> Array:
@@ -38,14 +47,14 @@ def pose_of_numbers(values: Any, name: str) -> Array:
         raise fault(name, f"holds no pose ({shorten(error)})", EXPECTED) from error
     numbers = array.ravel()
     if array.shape == (4, 3):
-        raise fault(name, "holds four rows of three numbers", f"transpose it: {EXPECTED}")
+        raise fault(name, "holds four rows of three numbers", _BELOW)
     if array.ndim > 1 and len(array) > 1 and array[0].size in (12, 16, _QUATERNION, _TIMED):
         raise fault(name, f"holds {len(array)} poses", ONE_POSE)
     in_one_row = array.ndim == 1 or len(array) == 1
     if numbers.size in (_QUATERNION, _TIMED) and in_one_row:
         return _placed(numbers[-7:-4], _rotation(numbers[-4:], name))
     if numbers.size not in _MATRIX:
-        raise fault(name, f"holds {numbers.size} numbers", EXPECTED)
+        raise fault(name, f"holds {numbers.size} numbers", _ANGLES if numbers.size == _SIX else EXPECTED)
     T = np.eye(4)
     T.flat[: numbers.size] = numbers
     return T

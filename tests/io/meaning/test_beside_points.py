@@ -63,6 +63,41 @@ def test_a_scale_in_the_attributes_of_xarray_counts_too() -> None:
             PointCloud.of(x)
 
 
+class Variable:
+    """As netCDF4's: `scale` says whether it multiplies by its scale itself."""
+
+    def __init__(self, values: np.ndarray, scale: bool) -> None:
+        self.values, self.scale, self.shape, self.ndim = values, scale, values.shape, values.ndim
+
+    def __array__(self, dtype: Any = None, copy: bool | None = None) -> np.ndarray:
+        return np.asarray(self.values * 0.001 if self.scale else self.values, dtype)
+
+    def __getitem__(self, key: Any) -> Any:
+        return np.asarray(self)[key]
+
+    def __len__(self) -> int:
+        return len(self.values)
+
+    def ncattrs(self) -> list[str]:
+        return ["scale_factor"]
+
+    def getncattr(self, key: str) -> float:
+        return {"scale_factor": 0.001}[key]
+
+
+def test_variables_of_netcdf_that_do_not_scale_themselves() -> None:
+    # Before, millimetres were metres without a word.
+    def variables(scale: bool) -> list[Any]:
+        whole = Variable(WHOLE, scale)
+        return [whole, {"points": whole}, {key: Variable(each, scale) for key, each in COLUMNS.items()}]
+
+    for x in variables(False):
+        with pytest.raises(ValueError, match="'scale_factor' beside them is 0.001"):
+            PointCloud.of(x)
+    for x in variables(True):
+        np.testing.assert_array_equal(PointCloud.of(x).points, WHOLE * 0.001)
+
+
 @pytest.mark.parametrize(
     "entries, words",
     [

@@ -31,9 +31,12 @@ def test_records_of_x_y_and_z(name: str, tmp_path: Path) -> None:
 
 def test_geometries_in_binary_are_refused_with_what_reads_them(tmp_path: Path) -> None:
     table = pa.table({"geometry": pa.array([b"\1" * 29] * 60), "id": np.arange(60)})
-    geo = b'{"version": "1.0.0", "primary_column": "geometry", "columns": {"geometry": {"encoding": "WKB"}}}'
+    columns = b'{"geometry": {"encoding": "WKB", "crs": null}}'
+    geo = b'{"version": "1.0.0", "primary_column": "geometry", "columns": ' + columns + b"}"
     parquet.write_table(table.replace_schema_metadata({b"geo": geo}), tmp_path / "a.parquet")
-    with pytest.raises(ValueError, match=r"WKB\); give geopandas.read_parquet\(path\)\.get_coordinates"):
+    with pytest.raises(
+        ValueError, match=r"WKB\); give x\.get_coordinates.* of x = geopandas.read_parquet\(path\)"
+    ):
         PointCloud.of(tmp_path / "a.parquet")
 
 

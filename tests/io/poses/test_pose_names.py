@@ -44,6 +44,10 @@ EUROC = (
         f"%time x y z ori_w ori_x ori_y ori_z\n0 {T} {WXYZ}",
         f"# x [m], y [m], z [m], qw [], qx [], qy [], qz []\n{T} {WXYZ}",
         f"# x y z qw qx qy qz (metres, map)\n{T} {WXYZ}",
+        # As Open3D 0.20.0 writes TUM: no line break behind the names. A later release may have one.
+        f"# TUM trajectory, format: <t> <x> <y> <z> <qx> <qy> <qz> <qw>0 {T} {Q}\n",
+        f"# TUM trajectory, format: <t> <x> <y> <z> <qx> <qy> <qz> <qw>-1.5 {T} {Q}\r\n",
+        f"# TUM trajectory, format: <t> <x> <y> <z> <qx> <qy> <qz> <qw>\n0 {T} {Q}",
         # Other names of the parts, and words that name no column but the order.
         f"x y z qr qi qj qk\n{T} {WXYZ}",
         f"tx ty tz qs qx qy qz\n{T} {WXYZ}",
@@ -63,6 +67,16 @@ def test_names_of_the_columns_say_where_w_stands(tmp_path: Path, text: str) -> N
     path = tmp_path / "pose.txt"
     path.write_text(text)
     np.testing.assert_allclose(read_pose(path), POSE, rtol=0, atol=1e-14)
+
+
+@pytest.mark.parametrize("others", [1, 2, 3])
+def test_a_trajectory_of_open3d_is_refused_with_its_first_pose_counted(tmp_path: Path, others: int) -> None:
+    # That one was left out with the comment, so that of two poses the second was taken.
+    path = tmp_path / "pose.txt"
+    more = "".join(f"{k + 1} {T} {Q}\n" for k in range(others))
+    path.write_text(f"# TUM trajectory, format: <t> <x> <y> <z> <qx> <qy> <qz> <qw>0 {T} {Q}\n{more}")
+    with pytest.raises(ValueError, match=rf"holds {others + 1} poses; keep the one"):
+        read_pose(path)
 
 
 @pytest.mark.parametrize(
