@@ -423,6 +423,12 @@ def test_the_cure_for_a_translation_below_the_rotation_gives_the_pose(tmp_path: 
     np.testing.assert_allclose(read_pose(tmp_path / "pose.txt"), TURNED, rtol=0, atol=1e-12)
 
 
+@pytest.mark.parametrize("ragged", [[[[1, 2], [3]], [0, 0, 0]], [{"a": 1}, 3], [[], [[]]], ([1, [2]], "x")])
+def test_lists_of_anything_are_refused_in_our_words(ragged: Any) -> None:
+    with pytest.raises(ValueError, match="init: expected"):
+        Prior(init=ragged)
+
+
 @pytest.mark.parametrize("held", ["transformation", "T_target_source", "homogeneous", "transform_matrix"])
 def test_a_result_in_place_of_its_pose_is_told(held: str) -> None:
     with pytest.raises(ValueError, match=f"init: expected numbers .*; give its {held}"):

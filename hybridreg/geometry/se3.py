@@ -178,11 +178,18 @@ def _cure_of(T: Any) -> str:
                 f"; of a message of ROS: T = numpy.eye(4), T[:3, 3] = x, y, z of its {place}, T[:3, :3] = "
                 f"scipy.spatial.transform.Rotation.from_quat([q.x, q.y, q.z, q.w]).as_matrix() of its {turn}"
             )
-    if isinstance(T, (tuple, list)) and [np.size(each) for each in T] == [9, 3]:
+    if isinstance(T, (tuple, list)) and [_size(each) for each in T] == [9, 3]:
         return "; of a rotation and a translation: numpy.vstack([numpy.column_stack([R, t]), [0, 0, 0, 1]])"
     if isinstance(T, dict):
         return f"; give the matrix in it, of {', '.join(map(str, T))}"[:200]
     return ""
+
+
+def _size(value: Any) -> int:
+    try:
+        return int(np.asarray(value, dtype=np.float64).size)
+    except (TypeError, ValueError, OverflowError):
+        return 0
 
 
 def rounded(T: Any, name: str, tolerance: float) -> Array:
