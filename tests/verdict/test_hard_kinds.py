@@ -186,3 +186,13 @@ def test_a_small_object_is_not_compared_more_finely_than_it_was_seen(seed: int) 
     result = hr.register(made.source, made.target)
     assert is_right(made, result.transformation)
     assert result.verdict != "failed"
+
+
+@pytest.mark.parametrize("seed", [428, 485])
+def test_a_right_pose_of_high_support_has_not_failed(seed: int) -> None:
+    made = hard.sample(
+        "building", seed
+    )  # a scan in one room, in the map of a floor: little is visible from either
+    result = hr.register(made.source, made.target)
+    assert is_right(made, result.transformation)
+    assert result.verdict != "failed"
