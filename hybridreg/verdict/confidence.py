@@ -113,8 +113,8 @@ def confidence(evidence: Evidence, rule: Boosted | None = None) -> float:
 
 
 def _supported(evidence: Evidence) -> bool:
-    # Sure by the support, and no rival does better. Of 28 poses that the trees alone call "failed" (hard kinds, even
-    # seeds) four have a support of 1.8 or more, of which three are right and one has a better rival.
+    # Sure by the support, and no rival does better. Of 28 poses that the trees alone call "failed" (hard kinds, seeds
+    # 420 to 452, and `building-485`) four have a support of 1.8 or more; three are right, and one has a better rival.
     return evidence.support >= OK_LOG_ODDS and evidence.rival_margin < 0.0
 
 

@@ -262,6 +262,6 @@ def _close(weighed: Weighed) -> Array:
     # Those that do nearly as well, those that would be likely if the pose were not known, and those that leave it in
     # doubt.
     told, doubted = min(weighed.evidence.support - CLEAR, LIKELY), weighed.doubts.one_place
-    told_of = [] if doubted is None else [T.tobytes() for T in doubted.rivals]
-    close = [one.T for one in weighed.rivals if one.log_odds > told or one.T.tobytes() in told_of]
+    told_of = [] if doubted is None else doubted.rivals
+    close = [one.T for one in weighed.rivals if one.log_odds > told or one in told_of]
     return np.array(close).reshape(-1, 4, 4)

@@ -10,15 +10,10 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
 from hybridreg.evidence.pose_evidence import PoseEvidence
 from hybridreg.geometry import se3
 from hybridreg.resolution import Tolerance
 from hybridreg.search.hypothesis import Hypothesis
-
-Array = NDArray[np.float64]
 
 # Of a rival: points off the commonest surface that agree, at least; those that are seen through, as a share of these
 # and of the visible, and of all that are visible, at most; nats per point closer than by chance, at least. By hand: of
@@ -27,9 +22,9 @@ _AGREE, _OF_AGREEING, _OF_RARE, _OF_ALL, _CLOSELY = 60, 0.65, 0.15, 0.1, 0.4
 
 
 class Rivalled(NamedTuple):
-    """The `rivals` (r, 4, 4) of such a pose that little contradicts, and how far the nearest of them lies."""
+    """The `rivals` of such a pose that little contradicts, and how far the nearest of them lies."""
 
-    rivals: Array
+    rivals: list[Hypothesis]
     nearest: Tolerance
 
 
@@ -37,12 +32,12 @@ def rivalled(at: PoseEvidence, found: list[Hypothesis]) -> Rivalled | None:
     """None where no rival counts, or the pose does not let both clouds be seen from one place."""
     if not at.views.from_one_place(at.T):
         return None
-    counts = [one.T for one in found if _uncontradicted(one.at)]
+    counts = [one for one in found if _uncontradicted(one.at)]
     if not counts:
         return None
     centre = se3.apply(at.T, at.views.middle)[0]
-    nearest = min((Tolerance.between(at.T, T, centre) for T in counts), key=lambda off: off.metres)
-    return Rivalled(np.array(counts), nearest)
+    nearest = min((Tolerance.between(at.T, one.T, centre) for one in counts), key=lambda off: off.metres)
+    return Rivalled(counts, nearest)
 
 
 def _uncontradicted(at: PoseEvidence) -> bool:

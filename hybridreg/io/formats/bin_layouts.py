@@ -17,9 +17,8 @@ _MANY = 500  # rows at which a width's contrast is hardly chance
 _LOOKED_AT = 120_000  # numbers
 # Contrast by which another width must win, and that of the parts of a file that are channels; by hand.
 _CLEARLY = 1.25
-_OVERWHELMINGLY = (
-    3.0  # of fewer rows: lasers stay below 1.8 by chance at 60 rows, radars of seven numbers above 6
-)
+# The same of fewer rows: lasers stay below 1.8 by chance at 60 rows, radars of seven numbers above 6.
+_OVERWHELMINGLY = 3.0
 _CHANNELS = 0.2
 _ALIKE = 1.05
 _WIDER = 20.0  # times as far across: no two halves of a scan, by hand
