@@ -99,16 +99,15 @@ def _step(
     normals = surfaces.facing(row)
     gap = np.einsum("ni,ni->n", moved - surfaces.points[row], normals)
     weight = 1.0 / (1.0 + (gap / width) ** 2)
-    centre = moved.mean(axis=0)
+    centre = np.ones(len(moved)) @ moved / len(moved)
     arms = moved - centre
-    J = np.column_stack(
-        [jacobian(arms, normals), np.einsum("ni,kij,nj->nk", normals, strains, arms, optimize=True)]
-    )
+    along = [np.einsum("ni,ni->n", normals @ strain, arms) for strain in strains]
     if rays is not None:
-        J = np.column_stack([J, np.einsum("ni,ni->n", normals, rays[hit] @ found.T[:3, :3].T)])
+        along.append(np.einsum("ni,ni->n", normals, rays[hit] @ found.T[:3, :3].T))
+    J = np.column_stack([jacobian(arms, normals), *along])
     weighted = (J * weight[:, None]).T
     H = weighted @ J
     x = -np.linalg.solve(H + 1e-6 * np.trace(H) * np.eye(len(H)), weighted @ gap)
-    strain = np.eye(3) + np.einsum("k,kij->ij", x[6 : 6 + len(strains)], strains)
+    strain = np.eye(3) + np.tensordot(x[6 : 6 + len(strains)], strains, axes=1)
     step = se3.about(centre, se3.rotation_about(x[:3]) @ strain, x[3:6])
     return Deformed(step @ found.T, found.offset + (float(x[-1]) if rays is not None else 0.0))

@@ -41,6 +41,8 @@ _OF_ROUND = 0.2
 _OFF_GROUND, _GAP = 1.5, 2.0
 # Steps to the middle of a circle: half a per cent of its radius remains.
 _STEPS = 200
+# Directions whose outermost points make the circle, which they leave by a thousandth of its radius; by hand.
+_DIRECTIONS = 72
 # Fewest points that coincide at the pose itself, for a turn to be looked for; by hand.
 _AT_POSE = 10.0
 
@@ -129,7 +131,11 @@ def _round(points: Array, ground: NDArray[np.bool_], up: Array, cell: float) -> 
 
 
 def _enclosing(places: Array) -> tuple[Array, float]:
-    # Middle and radius of the smallest circle around places (n, 2), nearly: by ever shorter steps to the farthest.
+    # Middle and radius of the smallest circle around places (n, 2), nearly: by ever shorter steps to the farthest, from
+    # the outermost ones' middle. The others do not count.
+    directions = np.linspace(0.0, 2.0 * np.pi, _DIRECTIONS, endpoint=False)
+    outermost = np.argmax(places @ np.array([np.cos(directions), np.sin(directions)]), axis=0)
+    places = places[np.unique(outermost)]
     middle = places.mean(axis=0)
     for step in range(1, _STEPS):
         middle = middle + (places[_farthest(places, middle)] - middle) / (step + 1)
