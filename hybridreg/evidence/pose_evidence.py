@@ -9,14 +9,17 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from hybridreg.evidence import information, range_offset, scale, stretch, traffic
+from hybridreg.evidence import information, traffic
 from hybridreg.evidence.agreement import Agreement, compare
+from hybridreg.evidence.deformation import motion_distortion, range_offset, scale, stretch
+from hybridreg.evidence.deformation.deformed import Deformed, Onto, closeness_of, rigidly
+from hybridreg.evidence.deformation.motion_distortion import MotionDistortion
+from hybridreg.evidence.deformation.range_offset import RangeOffset
+from hybridreg.evidence.deformation.scale import Size
+from hybridreg.evidence.deformation.stretch import Stretch
 from hybridreg.evidence.evidence import Evidence
 from hybridreg.evidence.information import Information
 from hybridreg.evidence.log_odds import log_odds
-from hybridreg.evidence.range_offset import RangeOffset
-from hybridreg.evidence.scale import Size
-from hybridreg.evidence.stretch import Stretch
 from hybridreg.evidence.surface_distance import closeness
 from hybridreg.evidence.views import Views
 
@@ -53,7 +56,7 @@ class PoseEvidence:
     @cached_property
     def size(self) -> Size:
         """The size at which the source fits better, if any."""
-        return scale.size(self.views, self.T, self.closeness, self.range_offset)
+        return scale.size(self.views, self.T, self.closeness, self._explained)
 
     @cached_property
     def range_offset(self) -> RangeOffset | None:
@@ -63,7 +66,21 @@ class PoseEvidence:
     @cached_property
     def stretch(self) -> Stretch | None:
         """How the source must be stretched to fit better, if it must."""
-        return stretch.stretch(self.views, self.T, self.closeness, self.range_offset)
+        return stretch.stretch(self.views, self.T, self.closeness, self._explained)
+
+    @cached_property
+    def motion_distortion(self) -> MotionDistortion | None:
+        """How a sensor moved while it measured, if one did."""
+        return motion_distortion.motion_distortion(self.views, self.T)
+
+    def _explained(self, fitted: Array) -> bool:
+        # Whether an offset of the ranges, or a sensor's motion, lets the clouds lie as closely as another deformation
+        # (4, 4), affine: nothing is strained then.
+        onto, offset, motion = Onto.target(self.views), self.range_offset, self.motion_distortion
+        strained = closeness_of(onto, Deformed(fitted))
+        if offset is not None and offset.close >= strained:
+            return True
+        return motion is not None and motion.gain >= strained - rigidly(onto, self.T)
 
     @cached_property
     def traffic(self) -> Array | None:

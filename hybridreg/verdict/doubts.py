@@ -10,11 +10,12 @@ from numpy.typing import NDArray
 
 from hybridreg.evidence import corner, lone_thing
 from hybridreg.evidence.covariance import of_information
+from hybridreg.evidence.deformation.motion_distortion import MotionDistortion
+from hybridreg.evidence.deformation.range_offset import RangeOffset
+from hybridreg.evidence.deformation.stretch import Stretch
 from hybridreg.evidence.evidence import Evidence
 from hybridreg.evidence.log_odds import FAILED
 from hybridreg.evidence.pose_evidence import PoseEvidence
-from hybridreg.evidence.range_offset import RangeOffset
-from hybridreg.evidence.stretch import Stretch
 from hybridreg.geometry.ground_relief import TELLS
 from hybridreg.resolution import Tolerance, tolerance
 from hybridreg.scene import Scene
@@ -57,6 +58,8 @@ class Doubts:
         How the source fits better.
     range_offset : RangeOffset or None
         The offset of its ranges at which it fits clearly better; no doubt where that lies within the tolerance.
+    motion_distortion : MotionDistortion or None
+        How a sensor moved while it measured; no doubt where the pose lies within the tolerance.
     traffic : (3,) float64 or None
         Direction along which vehicles alone hold the pose.
     """
@@ -69,6 +72,7 @@ class Doubts:
     one_place: Rivalled | None = None
     stretch: Stretch | None = None
     range_offset: RangeOffset | None = None
+    motion_distortion: MotionDistortion | None = None
     traffic: Array | None = None
 
     def __bool__(self) -> bool:
@@ -82,8 +86,9 @@ class Doubts:
 
     @property
     def about_source(self) -> bool:
-        """Whether the source is deformed, so that no pose is right."""
-        return self.stretch is not None or (self.range_offset is not None and self.range_offset.beyond)
+        """Whether a cloud is deformed, so that no pose is right."""
+        known = (self.range_offset, self.motion_distortion)
+        return self.stretch is not None or any(one is not None and one.beyond for one in known)
 
     @classmethod
     def about(
@@ -98,15 +103,19 @@ class Doubts:
         )
         if not likely:
             return quick
-        opposite, offset = lone_thing.opposite(scene, at), at.range_offset
+        opposite, offset, motion = lone_thing.opposite(scene, at), at.range_offset, at.motion_distortion
         strained = at.stretch is not None or evidence.size_gain > SIZE_GAIN
+        moved = None if strained else motion
         return replace(
             quick,
             lone_thing=opposite is not None and scene.pair.allows(opposite),
             one_place=rivalled(at, found),
             corner=corner.bare_corner(at) and corner.others_allowed(scene.pair, at),
             stretch=at.stretch,
-            range_offset=offset if offset is not None and offset.told and not strained else None,
+            range_offset=offset
+            if offset is not None and offset.told and not strained and not moved
+            else None,
+            motion_distortion=moved,
             traffic=None if scene.pair.drawn else at.traffic,
         )
 

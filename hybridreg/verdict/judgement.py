@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 
 from hybridreg.evidence import match_agreement
 from hybridreg.evidence.agreement import Agreement, OneWay
+from hybridreg.evidence.deformation.scale import Size
 from hybridreg.evidence.evidence import NO_RIVAL, Evidence, share
 from hybridreg.evidence.log_odds import FAILED, OK, OK_LOG_ODDS, log_odds
 from hybridreg.evidence.pose_evidence import PoseEvidence
-from hybridreg.evidence.scale import Size
 from hybridreg.evidence.views import View
 from hybridreg.geometry import se3
 from hybridreg.geometry.fitness import Overlay

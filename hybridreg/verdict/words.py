@@ -9,10 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybridreg.evidence.agreement import Agreement
+from hybridreg.evidence.deformation.motion_distortion import MotionDistortion
+from hybridreg.evidence.deformation.range_offset import RangeOffset
+from hybridreg.evidence.deformation.stretch import Stretch
 from hybridreg.evidence.evidence import Evidence
 from hybridreg.evidence.information import Information
-from hybridreg.evidence.range_offset import RangeOffset
-from hybridreg.evidence.stretch import Stretch
 from hybridreg.resolution import Tolerance
 from hybridreg.verdict.confidence import (
     CLEAR,
@@ -68,6 +69,7 @@ def reasons(
         *_upside_down(evidence),
         *_strained(evidence, doubts.stretch),
         *_off_in_range(doubts.range_offset),
+        *_in_motion(doubts.motion_distortion),
         *_with_traffic(doubts.traffic),
         *_against(evidence, agreement, held, doubts.through_walls),
         *_from_one_side(doubts.lone_thing),
@@ -167,6 +169,16 @@ def _off_in_range(offset: RangeOffset | None) -> Iterator[str]:
         yield (
             f"the source fits better when all its ranges are {abs(offset.metres):.2f} m {than}{harm}: is the range "
             "offset of one of the sensors calibrated?"
+        )
+
+
+def _in_motion(motion: MotionDistortion | None) -> Iterator[str]:
+    if motion is not None:
+        harm = ", so that no rigid pose is right" if motion.beyond else ""
+        yield (
+            f"the {motion.side} fits better when its sensor turned by {motion.degrees:.1f} deg and moved by "
+            f"{motion.metres:.2f} m within one sweep{harm}: undo its motion by the times of its points (deskew it) "
+            "before it is registered"
         )
 
 

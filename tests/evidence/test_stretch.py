@@ -15,8 +15,8 @@ import hybridreg as hr
 from hybridreg.classical.voxel import VoxelGrid
 from hybridreg.data.loaders.folder import load_pair
 from hybridreg.evidence import views
+from hybridreg.evidence.deformation.stretch import Stretch
 from hybridreg.evidence.pose_evidence import PoseEvidence
-from hybridreg.evidence.stretch import Stretch
 from hybridreg.pair import Pair
 
 Array = NDArray[np.float64]

@@ -9,13 +9,13 @@ on the ground, and those of right poses often fit best when they are strained by
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from hybridreg.evidence.deformed import NO_STRAIN, fit
-from hybridreg.evidence.range_offset import RangeOffset
+from hybridreg.evidence.deformation.deformed import Onto, fit
 from hybridreg.evidence.surface_distance import closeness
 from hybridreg.evidence.views import Views
 from hybridreg.geometry import se3
@@ -53,9 +53,11 @@ class Stretch(NamedTuple):
         return bool(least / most > _ALIKE)
 
 
-def stretch(views: Views, T_target_source: Array, close: float, offset: RangeOffset | None) -> Stretch | None:
-    """The stretch about a pose (4, 4) whose closeness is `close`; None where it fits hardly better, an `offset` of its
-    ranges lets it lie as closely, or neither cloud shows its ground."""
+def stretch(
+    views: Views, T_target_source: Array, close: float, explained: Callable[[Array], bool]
+) -> Stretch | None:
+    """The stretch about a pose (4, 4) whose closeness is `close`; None where it fits hardly better, where that is
+    `explained` otherwise, or where neither cloud shows its ground."""
     up = _up(views, T_target_source)
     if up is None:
         return None
@@ -63,12 +65,11 @@ def stretch(views: Views, T_target_source: Array, close: float, offset: RangeOff
     for strains, read, tries in ((_level(up), _along_the_ground, 2), (upright, _of_heights, 1)):
         start = T_target_source
         for _ in range(tries):
-            fitted = fit(views, start, strains).T
+            fitted = fit(Onto.target(views), start, strains).T
             found = read(views, up, fitted)
             if found is None:
                 break
-            explained = offset is not None and offset.explains(views, fitted)
-            if _is_better(views, T_target_source, close, fitted) and not explained:
+            if _is_better(views, T_target_source, close, fitted) and not explained(fitted):
                 return found
             # Far points may have found no partners, and the fit stopped half-way: on from twice the strain.
             start = fitted @ np.linalg.inv(T_target_source) @ fitted
@@ -78,7 +79,7 @@ def stretch(views: Views, T_target_source: Array, close: float, offset: RangeOff
 def _is_better(views: Views, T: Array, close: float, fitted: Array) -> bool:
     # Than the pose, and than any near by.
     enough = closeness(views.fine, fitted) - _GAIN
-    return enough >= close and enough >= closeness(views.fine, fit(views, T, NO_STRAIN).T)
+    return enough >= close and enough >= closeness(views.fine, fit(Onto.target(views), T).T)
 
 
 def _along_the_ground(views: Views, up: Array, fitted: Array) -> Stretch | None:

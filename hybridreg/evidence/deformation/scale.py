@@ -3,13 +3,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from hybridreg.evidence.deformed import fit
-from hybridreg.evidence.range_offset import RangeOffset
+from hybridreg.evidence.deformation.deformed import Onto, fit
 from hybridreg.evidence.surface_distance import closeness
 from hybridreg.evidence.views import Views
 from hybridreg.geometry import se3
@@ -24,7 +24,7 @@ _MOST = 1.25
 # Scales nearer to 1 than this are noise: of 38 right poses, real and simulated, four differ by more, and none of these
 # lies closer at that scale.
 _LEAST = 0.01
-# Nats per point that a size must gain for an offset to be tried instead: by hand.
+# Nats per point that a size must gain for it to matter whether it is explained otherwise: by hand.
 _TOLD = 0.05
 
 
@@ -37,15 +37,15 @@ class Size(NamedTuple):
     off: Tolerance = Tolerance(0.0, 0.0)
 
 
-def size(views: Views, T_target_source: Array, close: float, offset: RangeOffset | None) -> Size:
-    """Size at which the source fits best about a pose (4, 4) whose closeness is `close`, unless an `offset` of its
-    ranges lets it lie as closely."""
-    fitted = fit(views, T_target_source, _ALIKE).T
+def size(views: Views, T_target_source: Array, close: float, explained: Callable[[Array], bool]) -> Size:
+    """Size at which the source fits best about a pose (4, 4) whose closeness is `close`, unless that is `explained`
+    otherwise."""
+    fitted = fit(Onto.target(views), T_target_source, _ALIKE).T
     scale = float(np.cbrt(np.linalg.det(fitted[:3, :3])))
     if not _LEAST < abs(np.log(max(scale, 1e-9))) < np.log(_MOST):
         return Size()
     gain = closeness(views.fine, fitted) - close
-    if gain <= 0.0 or (gain > _TOLD and offset is not None and offset.explains(views, fitted)):
+    if gain <= 0.0 or (gain > _TOLD and explained(fitted)):
         return Size()
     middle = views.middle
     turn = se3.project(fitted[:3, :3])
