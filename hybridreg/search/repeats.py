@@ -37,6 +37,8 @@ _MOST = 4
 _APART = 2
 # The same of turns about a thing: when its near side has turned away, little of it is left; by hand.
 _OF_ROUND = 0.2
+# Share of a thing's points that are no stray returns, at least; by hand.
+_NOT_STRAY = 0.98
 # Cells over the ground from which a point belongs to a thing, and cells between two; by hand.
 _OFF_GROUND, _GAP = 1.5, 2.0
 # Steps to the middle of a circle: half a per cent of its radius remains.
@@ -70,7 +72,11 @@ class _Place(MovedPoints):
         self.centres = _apart([*own, views.target.centre, origin], 2.0 * self.cell)
         self.up = views.vertical(axes)
         self.least = _SHARE_OF_ONE_PLACE if views.from_one_place(T) else _SHARE
-        self.round = _round(self.others, self.other_axis == 0, self.up, self.cell)
+        self.round = [*_standing(self.others, self.other_axis == 0, self.up, self.cell)]
+        # A thing alone, seen from outside, whose largest face passes for a ground.
+        centre, radius = _circle(self.others, self.up, self.cell)
+        if np.linalg.norm(views.target.centre - centre) > radius:
+            self.round.append((centre, radius))
 
     def shifted(self) -> Iterator[Array]:
         middle = self.things[self.axis > 0].mean(axis=0)
@@ -94,8 +100,7 @@ class _Place(MovedPoints):
         own = self.things[self.axis > 0]
         for centre in self.centres:
             yield from self._about(centre, own[: _POINTS // 3], others, _OF_ALL)
-        if self.round is not None:
-            centre, radius = self.round
+        for centre, radius in self.round:
             arms = own - centre
             within = np.linalg.norm(arms - np.outer(arms @ self.up, self.up), axis=1) < radius
             yield from self._about(centre, own[within], others, _OF_ROUND)
@@ -113,21 +118,28 @@ class _Place(MovedPoints):
             yield se3.about(centre, turns[k], np.zeros(3))
 
 
-def _round(points: Array, ground: NDArray[np.bool_], up: Array, cell: float) -> tuple[Array, float] | None:
+def _standing(
+    points: Array, ground: NDArray[np.bool_], up: Array, cell: float
+) -> Iterator[tuple[Array, float]]:
     # Centre and radius of what may be round, like a gear or a wheel: most of what stands on the ground, or the table.
     if not ground.any():
-        return None
-    frame = se3.turn_to_z(up)
-    places = points @ frame.T
+        return
+    places = points @ se3.turn_to_z(up).T
     heights = np.abs(places[:, 2] - np.median(places[ground, 2]))
     thing = things(places[:, :2], heights, _OFF_GROUND * cell, _GAP * cell)
     counts = np.bincount(thing)
     counts[GROUND] = 0
-    if counts.max() <= counts.sum() / 2:
-        return None
-    own = places[thing == counts.argmax()]
-    middle, radius = _enclosing(own[:, :2])
-    return np.array([*middle, own[:, 2].mean()]) @ frame, radius + cell
+    if counts.max() > counts.sum() / 2:
+        yield _circle(points[thing == counts.argmax()], up, cell)
+
+
+def _circle(points: Array, up: Array, cell: float) -> tuple[Array, float]:
+    # Centre and radius of the circle around points, seen along `up`.
+    frame = se3.turn_to_z(up)
+    places = points @ frame.T
+    from_median = np.linalg.norm(places[:, :2] - np.median(places[:, :2], axis=0), axis=1)
+    middle, radius = _enclosing(places[from_median <= np.quantile(from_median, _NOT_STRAY), :2])
+    return np.array([*middle, places[:, 2].mean()]) @ frame, radius + cell
 
 
 def _enclosing(places: Array) -> tuple[Array, float]:
