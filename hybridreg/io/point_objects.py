@@ -205,7 +205,7 @@ def _refuse_grid(x: Any, names: list[Any] | None, name: str) -> None:
     if (
         not {"x", "y"} <= flat
         or not hasattr(x, "to_dataframe")
-        or {"x", "y", "z"} <= {*map(str, names or ())}
+        or {"x", "y", "z"} <= {*map(str, getattr(x, "data_vars", names) or ())}
     ):
         return
     call = "to_dataframe()" if hasattr(x, "data_vars") else 'to_dataframe("z")'
