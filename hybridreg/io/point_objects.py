@@ -4,6 +4,7 @@ imports."""
 
 from __future__ import annotations
 
+import inspect
 import io
 from collections.abc import Mapping
 from typing import Any, NoReturn
@@ -258,9 +259,14 @@ def _as_array(x: Any, name: str) -> NDArray[Any]:
         # numpy leaves the masks out
         array = np.ma.array(array, mask=[np.ma.getmaskarray(each) for each in x])
     if array.ndim == 0 and array.dtype.kind in "OUS":
-        read = callable(getattr(x, "read", None))
-        _refuse(x, name, "pass what its read() returns" if read else _CURE)
+        _refuse(x, name, "pass what its read() returns" if _reads_itself(x) else _CURE)
     return array
+
+
+def _reads_itself(x: Any) -> bool:
+    # Not by a function of its class that takes a path, as pointcloudkit 0.1.0's clouds have.
+    found = inspect.getattr_static(x, "read", None)
+    return callable(getattr(x, "read", None)) and not isinstance(found, (staticmethod, classmethod))
 
 
 def _refuse(x: Any, name: str, cure: str) -> NoReturn:

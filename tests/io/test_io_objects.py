@@ -519,6 +519,49 @@ def test_reconstructions_of_pycolmap() -> None:
     assert "empty" in refused(SimpleNamespace(points3D={}, read=lambda path: None))
 
 
+def test_clouds_with_a_reader_of_their_class() -> None:
+    # As pointcloudkit 0.1.0's, whose `PointCloud.read(path)` reads files: the cure was "pass what its read() returns".
+    class Cloud:
+        @staticmethod
+        def read(path: str) -> None: ...
+
+    class Built(Cloud):
+        @classmethod
+        def read(cls, path: str) -> None: ...
+
+    for each in (Cloud(), Built()):
+        assert "numpy.column_stack([x, y, z])" in refused(each)
+        assert "read()" not in refused(each)
+
+
+@pytest.mark.parametrize("error", [KeyError, ValueError, RuntimeError, TypeError])
+def test_types_that_raise_another_error_for_what_they_lack(error: type[Exception]) -> None:
+    # As pylas 0.4.3's clouds; the words were pylas's own, "no field of name prepared", and named no cloud.
+    class Cloud:
+        x, y, z = P.T
+
+        def __getattr__(self, asked: str) -> Any:
+            raise error(f"no field of name {asked}")
+
+    told = refused(Cloud())
+    assert f"it raises {error.__name__}, not AttributeError" in told
+    assert "numpy.column_stack([x.x, x.y, x.z])" in told
+    same(np.column_stack([Cloud.x, Cloud.y, Cloud.z]))
+
+
+def test_dictionaries_whose_attributes_are_their_entries() -> None:
+    # As configurations of networks often are; what such a one lacks was a KeyError of 'prepared'.
+    class Entries(dict[str, Any]):
+        __getattr__ = dict.__getitem__
+
+    same(Entries(zip("xyz", P.T, strict=True)))
+    same(Entries(points=P))
+    with pytest.warns(UserWarning, match="0.001 m"):
+        np.testing.assert_allclose(
+            PointCloud.of(Entries(points=P * 1000, unit="mm"), name="target").points, P
+        )
+
+
 def test_epochs_of_py4dgeo() -> None:
     same(SimpleNamespace(cloud=P, normals=None))  # as py4dgeo 1.2.0 keeps them
 
