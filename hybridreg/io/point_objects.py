@@ -14,11 +14,12 @@ from numpy.typing import NDArray
 
 from hybridreg.io import tables
 from hybridreg.io.arrays import array_points, together_in
+from hybridreg.io.coordinate_systems.declared_system import PROJECT, unit_declared
 from hybridreg.io.coordinate_systems.geo_columns import coordinates_of, unit_of_frame, unit_of_schema
 from hybridreg.io.coordinate_systems.las_extended import records_of_header
 from hybridreg.io.coordinate_systems.las_units import metres_of_las, metres_of_system
 from hybridreg.io.coordinate_systems.length_unit import in_metres
-from hybridreg.io.formats.las_withheld import without_withheld
+from hybridreg.io.formats.las_withheld import flags_withheld, without_withheld
 from hybridreg.io.list_columns import listed_points, without_records
 from hybridreg.io.meaning.beside_points import refuse_second_cloud, with_what_is_beside
 from hybridreg.io.meaning.length_units import unit_given
@@ -75,14 +76,16 @@ def points_of(x: Any, name: str, depth: int = 0) -> Array:
         return _from_array(clouds, name)
     _refuse_mesh(x, name)
     if hasattr(getattr(x, "header", None), "vlrs") and hasattr(x, "xyz"):  # laspy
-        points = without_withheld(_from_array(np.asarray(x.xyz), name), getattr(x, "withheld", None), name)
+        points = without_withheld(_from_array(np.asarray(x.xyz), name), flags_withheld(x), name)
         return metres_of_las(points, records_of_header(x.header, name), name)
     held = _held(x)
     if held is not None and depth < _DEEPEST:
         return _held_points(held, x, name, depth)
     if all(hasattr(x, axis) for axis in "xyz"):  # laspy's records
         points = tables.points({axis: getattr(x, axis) for axis in "xyz"}, list("xyz"), name)
-        return without_withheld(points, getattr(x, "withheld", None), name)
+        points = without_withheld(points, flags_withheld(x), name)
+        declared = unit_declared(x)
+        return points if declared is None else metres_of_system(points, declared, name, PROJECT)
     if isinstance(x, (list, tuple)) and x and not isinstance(x[0], (list, np.ndarray, int, float)):
         rows = _named_rows(x)
         if rows is not None:
@@ -158,9 +161,13 @@ def _clouds_of_scene(x: Any) -> Array | None:
 
 
 def _held_points(held: Any, x: Any, name: str, depth: int) -> Array:
-    points = points_of(held, name, depth + 1)
+    points = without_withheld(points_of(held, name, depth + 1), flags_withheld(x), name)
     # What lies deepest knows best, and was read in metres.
-    said = None if unit_given(held, name) else unit_given(x, name)
+    if unit_given(held, name) or unit_declared(held) or hasattr(getattr(held, "header", None), "vlrs"):
+        return points
+    said, declared = unit_given(x, name), unit_declared(x)
+    if said is None and declared is not None:
+        return metres_of_system(points, declared, name, PROJECT)
     return in_metres(points, said, name)
 
 
