@@ -203,7 +203,8 @@ def _named_rows(rows: Any) -> Any:
     if hasattr(first, "_fields"):
         return {key: [row[k] for row in rows] for k, key in enumerate(first._fields)}
     if all(hasattr(first, axis) for axis in "xyz"):
-        return {axis: [getattr(row, axis) for row in rows] for axis in "xyz"}
+        told = ("x", "y", "z", *(["withheld"] if hasattr(first, "withheld") else []))  # copclib's points
+        return {each: [getattr(row, each) for row in rows] for each in told}
     return None
 
 

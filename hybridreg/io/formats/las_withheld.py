@@ -42,9 +42,13 @@ def without_withheld(points: Array, withheld: Any, name: str) -> Array:
 
 
 def flags_withheld(x: Any) -> Any:
-    """The flags of a LAS cloud of another library: its `withheld`, as laspy's; or the column that lazpy 0.9.2's readers
-    decode; None where it has neither."""
+    """The flags of a LAS cloud of another library: its `withheld`, as laspy's, or those of its points one by one, as
+    copclib 2.6.3 has them; or the column that lazpy 0.9.2's readers decode; None where it has none."""
     flags = getattr(x, "withheld", None)
-    if flags is not None or not (callable(getattr(x, "arrays", None)) and hasattr(x, "point_format")):
+    if flags is not None:
         return None if callable(flags) else flags
-    return x.arrays(_COLUMN, start=0)[_COLUMN]
+    if callable(getattr(x, "arrays", None)) and hasattr(x, "point_format"):
+        return x.arrays(_COLUMN, start=0)[_COLUMN]
+    if hasattr(x, "point_format_id") and hasattr(x, "__getitem__") and len(x) and hasattr(x[0], "withheld"):
+        return [each.withheld for each in x]
+    return None

@@ -111,6 +111,19 @@ def test_points_that_were_deleted_are_left_out() -> None:
                 np.testing.assert_array_equal(points(each), P[20:])
 
 
+def test_points_of_copclib_that_were_deleted_are_left_out() -> None:
+    # As copclib 2.6.3's: x, y and z of all in one, and `withheld` of each.
+    each = [SimpleNamespace(x=x, y=y, z=z, withheld=k < 20) for k, (x, y, z) in enumerate(P.tolist())]
+
+    class Points(list[Any]):
+        x, y, z = P.T
+        point_format_id = 7
+
+    for held, words in ((Points(each), "20 of 80 points are flagged as withheld"), (each, "by 'withheld'")):
+        with pytest.warns(UserWarning, match=words):
+            np.testing.assert_array_equal(points(held), P[20:])
+
+
 def test_a_reader_that_was_read_from_is_refused() -> None:
     # The rest of its points were taken for the cloud.
     with pytest.raises(
