@@ -224,8 +224,22 @@ def test_what_is_called_unit_and_is_none() -> None:
     same(SimpleNamespace(points=P, units=None))
 
 
+@pytest.mark.parametrize("word, metres", [("fathoms", 1.8288), ("Nautical_Mile", 1852.0), ("nmi", 1852.0)])
+def test_units_of_soundings(word: str, metres: float) -> None:
+    with pytest.warns(UserWarning, match=f"its unit is {metres:g} m"):
+        cloud = PointCloud.of({**dict(zip("xyz", P.T, strict=True)), "units": word}, name="target")
+    np.testing.assert_allclose(cloud.points + cloud.offset, P * metres)
+
+
 def test_angles_and_units_that_differ_are_refused() -> None:
-    assert "'degrees_north'" in refused({**dict(zip("xyz", P.T, strict=True)), "units": "degrees_north"})
+    for angle in (
+        "degrees_north",
+        "degree_north",
+        "degree_E",
+        "degreesN",
+        "degrees_true",
+    ):  # CF's, for netCDF
+        assert f"{angle!r}" in refused({**dict(zip("xyz", P.T, strict=True)), "units": angle})
     xr = pytest.importorskip("xarray")
     units = {"x": "mm", "y": "mm", "z": "m"}
     mixed = xr.Dataset({k: ("n", v, {"units": units[k]}) for k, v in zip("xyz", P.T, strict=True)})
