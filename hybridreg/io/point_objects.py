@@ -90,6 +90,9 @@ def points_of(x: Any, name: str, depth: int = 0) -> Array:
         rows = _named_rows(x)
         if rows is not None:
             return points_of(rows, name, depth + 1)
+    entries = _entries(x)
+    if entries and depth < _DEEPEST:
+        return points_of(entries, name, depth + 1)
     points = with_what_is_beside(_from_array(_as_array(x, name), name), tables.attributes_beside(x), name)
     return in_metres(points, unit_given(x, name), name)
 
@@ -191,6 +194,15 @@ def _held(x: Any) -> Any:
     if callable(getattr(x, "cpu", None)) and callable(getattr(x, "numpy", None)):  # Open3D's own tensors
         return x.cpu().numpy()
     return None
+
+
+def _entries(x: Any) -> dict[str, Any] | None:
+    # zarr's groups since 3.0 and tensordict's are no mappings; what a group says of all its arrays stands in `attrs`.
+    if not callable(getattr(x, "keys", None)) or not hasattr(x, "__getitem__") or hasattr(x, "dtype"):
+        return None
+    attributes = getattr(x, "attrs", None)
+    said = dict(attributes) if isinstance(attributes, Mapping) else {}
+    return {**said, **{key: x[key] for key in x.keys() if isinstance(key, str)}}  # noqa: SIM118
 
 
 def _named_rows(rows: Any) -> Any:

@@ -7,7 +7,7 @@ import base64
 import contextlib
 import io
 from collections import namedtuple
-from types import SimpleNamespace
+from types import MappingProxyType, SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -574,6 +574,43 @@ def test_dictionaries_whose_attributes_are_their_entries() -> None:
         np.testing.assert_allclose(
             PointCloud.of(Entries(points=P * 1000, unit="mm"), name="target").points, P
         )
+
+
+def test_groups_that_are_no_mappings() -> None:
+    # As zarr 3.1's, whose arrays were names to numpy: "got dtype <U1".
+    class Held(np.ndarray):
+        attrs: Any = MappingProxyType({})
+
+    class Group:
+        def __init__(self, arrays: dict[str, Any], **attrs: Any) -> None:
+            self.arrays, self.attrs = arrays, attrs
+
+        def keys(self) -> Any:
+            return self.arrays.keys()
+
+        def __iter__(self) -> Any:
+            return iter(self.arrays)
+
+        def __len__(self) -> int:
+            return len(self.arrays)
+
+        def __getitem__(self, key: str) -> Any:
+            return self.arrays[key]
+
+    same(Group(dict(zip("xyz", P.T, strict=True))))
+    same(Group({"points": P}))
+    for group in (
+        Group({"points": P * 1000}, units="mm"),
+        Group(dict(zip("xyz", P.T * 1000, strict=True)), units="mm"),
+    ):
+        with pytest.warns(UserWarning, match="0.001 m"):
+            np.testing.assert_allclose(PointCloud.of(group, name="target").points, P)
+    counts = np.round(P.T * 1000).astype(np.int32)
+    scaled = Group(dict(zip("xyz", (each.view(Held) for each in counts), strict=True)))
+    for each in scaled.arrays.values():
+        each.attrs = {"scale_factor": 0.001}
+    assert "multiply them by it" in refused(scaled)
+    assert "name the coordinates x, y and z" in refused(Group({"a": P[:, 0]}))
 
 
 def test_epochs_of_py4dgeo() -> None:
