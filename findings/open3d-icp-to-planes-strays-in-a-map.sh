@@ -2,8 +2,8 @@
 # Open3D 0.20.0's `registration_icp` with point-to-plane, its `registration_generalized_icp` and the tensor
 # `icp` with point-to-plane solve for small turns about the origin of the coordinates. In a map's grid (UTM northings are
 # millions of metres) the equations lose all digits, in double precision and with exact normals: a pose three degrees and
-# 40 cm from the start, found to a millimetre at the origin, comes out as one kilometres off, or as the start itself,
-# with a fitness of 0; the generalized one is metres off at five kilometres already. Point-to-point is right everywhere.
+# 40 cm from the start, found to millimetres at the origin, comes out as one kilometres off, or as the start itself,
+# with a fitness of 0; the generalized one is metres off at five kilometres already. Point-to-point is the same everywhere.
 #
 # Guess before it was run: in double precision the pose is the same to a millimetre or so, with larger numbers in it.
 # For whom it matters: whoever registers clouds in a map's frame as they are. Where only one of the methods was tried, it looks
