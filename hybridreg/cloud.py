@@ -99,6 +99,7 @@ class PointCloud:
         ValueError
             Naming the cloud, the number that is wrong and a cure.
         """
+        x = gate.answering(x, name)
         x = getattr(x, "prepared", x)
         if isinstance(x, PointCloud):
             gate.check(x.points, name)
@@ -192,6 +193,7 @@ class PointCloud:
 
 def rows_of(x: Any, name: str) -> Array:
     """Every row (N, 3) of what `PointCloud.of` takes, in its own coordinates: few points or missing ones too."""
+    x = gate.answering(x, name)
     x = getattr(x, "prepared", x)
     if isinstance(x, PointCloud):
         rows: Array = x.points + x.offset

@@ -148,9 +148,10 @@ def check_stage_image(stage: Any, pair: Pair) -> None:
         raise ValueError(f"pair {pair.id}: {_label(stage)} needs an image; pass image=...")
 
 
-def check_scene(scene: Scene) -> None:
-    """Refuse levels that are too small to register; warn of a unit or a voxel that is obviously wrong."""
-    doubts = units.doubts(scene.pair)
+def check_scene(scene: Scene, given: Pair) -> None:
+    """Refuse levels that are too small to register; warn of a unit or a voxel that is obviously wrong. `given` is the
+    pair before anything was drawn into it: walls hide that its numbers are whole, or degrees."""
+    doubts = units.doubts(given if scene.pair.drawn else scene.pair)
     for name, text in doubts.items():
         _warn(f"{name}: {text}")
     for name, cloud, level in (

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -22,6 +22,7 @@ _THINNEST = 1e-6
 # The cure that only a caller has whose function takes the argument.
 OR_DROP = ' or pass nonfinite="drop"'
 _LOT = 2**18  # points
+_LACKED = "hybridreg_asks_for_what_nothing_has"
 _FILLED = 0.01  # share of points exactly at the origin from which they count as missing returns
 # Heights that rasters write for cells without data; other points must be far above them.
 _NO_HEIGHT = (-9999.0, -99999.0, -32768.0, -32767.0)
@@ -41,6 +42,28 @@ def coordinates(x: Any, name: str) -> Array:
         raise _unreadable(x, name, error) from error
     except Exception as error:  # a third-party object may raise anything
         raise _unreadable(x, name, error) from error
+
+
+def answering(x: Any, name: str) -> Any:
+    """`x`, to be asked for attributes; a plain dictionary of one whose attributes are its entries, as configurations of
+    networks have them.
+
+    Raises
+    ------
+    ValueError
+        It is no dictionary, and raises another error than AttributeError for what it lacks, as pylas 0.4.3's clouds do.
+    """
+    try:
+        hasattr(x, _LACKED)
+    except Exception as error:  # KeyError of `__getattr__ = dict.__getitem__`, ValueError of pylas
+        if isinstance(x, Mapping):
+            return dict(x)
+        kind = f"{type(x).__module__}.{type(x).__name__}"
+        raise ValueError(
+            f"{name}: cannot read points from {kind}: it raises {type(error).__name__}, not AttributeError, for an "
+            "attribute that it lacks; pass its coordinates in metres, such as numpy.column_stack([x.x, x.y, x.z])"
+        ) from error
+    return x
 
 
 def _unreadable(x: Any, name: str, error: Exception) -> ValueError:

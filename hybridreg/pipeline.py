@@ -238,7 +238,7 @@ class Pipeline(Stage):
         rng = np.random.default_rng([seed, zlib.crc32(pair.id.encode())])
         with clock.phase("downsample"):
             scene = replace(checked("downsample", self.downsample, self.downsample(pair)), clock=clock)
-        fitting.check_scene(scene)
+        fitting.check_scene(scene, pair)
         for name, cloud in (("source", scene.pair.source), ("target", scene.pair.target)):
             if len(cloud.seen.places) != 1:
                 scene.note(f"the {name} was seen from {_places(cloud)}")

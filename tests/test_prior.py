@@ -444,6 +444,30 @@ def test_a_pose_of_another_library_in_place_of_its_matrix_is_told(held: str) -> 
         Prior(init=SimpleNamespace(**{held: lambda: TURNED}))
 
 
+def test_several_poses_in_place_of_one_are_told() -> None:
+    # scipy 1.17's RigidTransform of three was to give its as_matrix(), which is three matrices, refused without a cure.
+    transforms = pytest.importorskip("scipy.spatial.transform")
+    if not hasattr(transforms, "RigidTransform"):
+        pytest.skip("scipy is older than 1.16")
+    three = transforms.RigidTransform.from_matrix(np.stack([TURNED] * 3))
+    with pytest.raises(ValueError, match=r"of its 3 poses give one, such as init\[0\]\.as_matrix\(\)"):
+        Prior(init=three)
+    np.testing.assert_allclose(Prior(init=three[0].as_matrix()).init, TURNED, rtol=0, atol=1e-12)
+    with pytest.raises(ValueError, match=r"of its 3 poses give one, such as init\[0\]"):
+        Prior(init=three.as_matrix())
+    with pytest.raises(ValueError, match=r"give its one pose, init\[0\]"):
+        Prior(init=TURNED[None])
+
+
+def test_a_dictionary_whose_attributes_are_its_entries_in_place_of_a_matrix_is_told() -> None:
+    class Entries(dict[str, Any]):
+        __getattr__ = dict.__getitem__  # what it lacks is a KeyError
+
+    for held, words in ((Entries(R=np.eye(3), t=np.zeros(3)), "R, t"), (Entries(T_est=TURNED), "T_est")):
+        with pytest.raises(ValueError, match=f"init: expected numbers .*; give the matrix in it, of {words}"):
+            Prior(init=held)
+
+
 def test_messages_and_parts_in_place_of_a_matrix_are_told() -> None:
     x, y, z, w = quaternion(TURNED[:3, :3])
     turn, place = SimpleNamespace(x=x, y=y, z=z, w=w), SimpleNamespace(x=1.0, y=2.0, z=3.0)

@@ -120,6 +120,7 @@ def random_rotation(rng: np.random.Generator) -> Array:
     )
 
 
+_POSE = (4, 4)
 # What to do with the numbers of a pose in another shape.
 _CURES = {
     (3, 4): "; append the row [0, 0, 0, 1]",
@@ -145,10 +146,13 @@ def check(T: Any, name: str = "T", tolerance: float = 1e-4) -> Array:
         raise ValueError(f"{name}: holds {len(T)} poses; give one pose{cure}")
     try:
         matrix = np.asarray(T, dtype=np.float64)
-    except (TypeError, ValueError, OverflowError) as error:
-        raise ValueError(f"{name}: expected numbers of shape (4, 4) ({error}){_cure_of(T)}") from error
+    except Exception as error:  # an object of another library may raise anything
+        raise ValueError(f"{name}: expected numbers of shape (4, 4) ({error}){_cure_of(T, name)}") from error
     if matrix.shape != (4, 4):
-        raise ValueError(f"{name}: expected shape (4, 4), got {matrix.shape}{_CURES.get(matrix.shape, '')}")
+        cure = _CURES.get(matrix.shape, "")
+        if matrix.ndim == 3 and matrix.shape[1:] in (_POSE, (3, 4)):
+            cure = _one_of(len(matrix), name)
+        raise ValueError(f"{name}: expected shape (4, 4), got {matrix.shape}{cure}")
     if not np.isfinite(matrix).all():
         raise ValueError(f"{name}: the matrix is not finite")
     if not np.allclose(matrix[3], [0, 0, 0, 1], atol=1e-9):
@@ -166,14 +170,17 @@ def check(T: Any, name: str = "T", tolerance: float = 1e-4) -> Array:
     return matrix
 
 
-def _cure_of(T: Any) -> str:
+def _cure_of(T: Any, name: str) -> str:
     """What to do with an object that is no matrix, where it is known."""
-    held = next((each for each in _HOLD if hasattr(T, each)), "")
+    held = next((each for each in _HOLD if _has(T, each)), "")
     if held:
-        return f"; give its {held}{'()' if callable(getattr(T, held)) else ''}"
+        count = None if isinstance(T, dict) else _count(T)  # scipy's RigidTransform may be any number of them
+        one = "" if count is None else _one_of(count, name)
+        call = f"{held}{'()' if callable(getattr(T, held)) else ''}"
+        return f"{one}.{call}" if one else f"; give its {call}"
     for outer, place, turn in _IN_ROS:
-        inner = getattr(T, outer, T)
-        if hasattr(inner, place) and hasattr(getattr(inner, turn, None), "w"):
+        inner = getattr(T, outer) if _has(T, outer) else T
+        if _has(inner, place) and _has(inner, turn) and _has(getattr(inner, turn), "w"):
             return (
                 f"; of a message of ROS: T = numpy.eye(4), T[:3, 3] = x, y, z of its {place}, T[:3, :3] = "
                 f"scipy.spatial.transform.Rotation.from_quat([q.x, q.y, q.z, q.w]).as_matrix() of its {turn}"
@@ -183,6 +190,28 @@ def _cure_of(T: Any) -> str:
     if isinstance(T, dict):
         return f"; give the matrix in it, of {', '.join(map(str, T))}"[:200]
     return ""
+
+
+def _one_of(count: int, name: str) -> str:
+    return (
+        f"; give its one pose, {name}[0]"
+        if count == 1
+        else f"; of its {count} poses give one, such as {name}[0]"
+    )
+
+
+def _has(x: Any, attribute: str) -> bool:
+    try:
+        return hasattr(x, attribute)
+    except Exception:  # a dictionary whose attributes are its entries may raise KeyError
+        return False
+
+
+def _count(x: Any) -> int | None:
+    try:
+        return len(x)
+    except TypeError:
+        return None
 
 
 def _size(value: Any) -> int:

@@ -4,6 +4,7 @@ imports."""
 
 from __future__ import annotations
 
+import inspect
 import io
 from collections.abc import Mapping
 from typing import Any, NoReturn
@@ -13,11 +14,12 @@ from numpy.typing import NDArray
 
 from hybridreg.io import tables
 from hybridreg.io.arrays import array_points, together_in
+from hybridreg.io.coordinate_systems.declared_system import PROJECT, unit_declared
 from hybridreg.io.coordinate_systems.geo_columns import coordinates_of, unit_of_frame, unit_of_schema
 from hybridreg.io.coordinate_systems.las_extended import records_of_header
 from hybridreg.io.coordinate_systems.las_units import metres_of_las, metres_of_system
 from hybridreg.io.coordinate_systems.length_unit import in_metres
-from hybridreg.io.formats.las_withheld import without_withheld
+from hybridreg.io.formats.las_withheld import flags_withheld, without_withheld
 from hybridreg.io.list_columns import listed_points, without_records
 from hybridreg.io.meaning.beside_points import refuse_second_cloud, with_what_is_beside
 from hybridreg.io.meaning.length_units import unit_given
@@ -74,18 +76,23 @@ def points_of(x: Any, name: str, depth: int = 0) -> Array:
         return _from_array(clouds, name)
     _refuse_mesh(x, name)
     if hasattr(getattr(x, "header", None), "vlrs") and hasattr(x, "xyz"):  # laspy
-        points = without_withheld(_from_array(np.asarray(x.xyz), name), getattr(x, "withheld", None), name)
+        points = without_withheld(_from_array(np.asarray(x.xyz), name), flags_withheld(x), name)
         return metres_of_las(points, records_of_header(x.header, name), name)
     held = _held(x)
     if held is not None and depth < _DEEPEST:
         return _held_points(held, x, name, depth)
     if all(hasattr(x, axis) for axis in "xyz"):  # laspy's records
         points = tables.points({axis: getattr(x, axis) for axis in "xyz"}, list("xyz"), name)
-        return without_withheld(points, getattr(x, "withheld", None), name)
+        points = without_withheld(points, flags_withheld(x), name)
+        declared = unit_declared(x)
+        return points if declared is None else metres_of_system(points, declared, name, PROJECT)
     if isinstance(x, (list, tuple)) and x and not isinstance(x[0], (list, np.ndarray, int, float)):
         rows = _named_rows(x)
         if rows is not None:
             return points_of(rows, name, depth + 1)
+    entries = _entries(x)
+    if entries and depth < _DEEPEST:
+        return points_of(entries, name, depth + 1)
     points = with_what_is_beside(_from_array(_as_array(x, name), name), tables.attributes_beside(x), name)
     return in_metres(points, unit_given(x, name), name)
 
@@ -157,9 +164,13 @@ def _clouds_of_scene(x: Any) -> Array | None:
 
 
 def _held_points(held: Any, x: Any, name: str, depth: int) -> Array:
-    points = points_of(held, name, depth + 1)
+    points = without_withheld(points_of(held, name, depth + 1), flags_withheld(x), name)
     # What lies deepest knows best, and was read in metres.
-    said = None if unit_given(held, name) else unit_given(x, name)
+    if unit_given(held, name) or unit_declared(held) or hasattr(getattr(held, "header", None), "vlrs"):
+        return points
+    said, declared = unit_given(x, name), unit_declared(x)
+    if said is None and declared is not None:
+        return metres_of_system(points, declared, name, PROJECT)
     return in_metres(points, said, name)
 
 
@@ -185,6 +196,15 @@ def _held(x: Any) -> Any:
     return None
 
 
+def _entries(x: Any) -> dict[str, Any] | None:
+    # zarr's groups since 3.0 and tensordict's are no mappings; what a group says of all its arrays stands in `attrs`.
+    if not callable(getattr(x, "keys", None)) or not hasattr(x, "__getitem__") or hasattr(x, "dtype"):
+        return None
+    attributes = getattr(x, "attrs", None)
+    said = dict(attributes) if isinstance(attributes, Mapping) else {}
+    return {**said, **{key: x[key] for key in x.keys() if isinstance(key, str)}}  # noqa: SIM118
+
+
 def _named_rows(rows: Any) -> Any:
     # Reading by position would be wrong where the rows have names.
     first = rows[0]
@@ -195,7 +215,8 @@ def _named_rows(rows: Any) -> Any:
     if hasattr(first, "_fields"):
         return {key: [row[k] for row in rows] for k, key in enumerate(first._fields)}
     if all(hasattr(first, axis) for axis in "xyz"):
-        return {axis: [getattr(row, axis) for row in rows] for axis in "xyz"}
+        told = ("x", "y", "z", *(["withheld"] if hasattr(first, "withheld") else []))  # copclib's points
+        return {each: [getattr(row, each) for row in rows] for each in told}
     return None
 
 
@@ -205,7 +226,7 @@ def _refuse_grid(x: Any, names: list[Any] | None, name: str) -> None:
     if (
         not {"x", "y"} <= flat
         or not hasattr(x, "to_dataframe")
-        or {"x", "y", "z"} <= {*map(str, names or ())}
+        or {"x", "y", "z"} <= {*map(str, getattr(x, "data_vars", names) or ())}
     ):
         return
     call = "to_dataframe()" if hasattr(x, "data_vars") else 'to_dataframe("z")'
@@ -258,9 +279,14 @@ def _as_array(x: Any, name: str) -> NDArray[Any]:
         # numpy leaves the masks out
         array = np.ma.array(array, mask=[np.ma.getmaskarray(each) for each in x])
     if array.ndim == 0 and array.dtype.kind in "OUS":
-        read = callable(getattr(x, "read", None))
-        _refuse(x, name, "pass what its read() returns" if read else _CURE)
+        _refuse(x, name, "pass what its read() returns" if _reads_itself(x) else _CURE)
     return array
+
+
+def _reads_itself(x: Any) -> bool:
+    # Not by a function of its class that takes a path, as pointcloudkit 0.1.0's clouds have.
+    found = inspect.getattr_static(x, "read", None)
+    return callable(getattr(x, "read", None)) and not isinstance(found, (staticmethod, classmethod))
 
 
 def _refuse(x: Any, name: str, cure: str) -> NoReturn:

@@ -20,6 +20,7 @@ from hybridreg.io.meaning.downward import tell_downward
 from hybridreg.io.meaning.first_column import FEWEST
 from hybridreg.io.meaning.image_shapes import refuse_image
 from hybridreg.io.meaning.length_units import one_unit, unit_given
+from hybridreg.io.meaning.named_dimensions import orders
 from hybridreg.io.meaning.unit_words import column_of_units, known_metres
 from hybridreg.io.record_fields import stack_axes
 
@@ -32,10 +33,14 @@ _UNNAMED = re.compile(r"(column_?|f|v|_)?\d+", re.IGNORECASE)
 
 def labels(x: Any) -> list[Any] | None:
     """Names of a table's columns; None for anything that is not a table."""
+    if hasattr(
+        x, "data_vars"
+    ):  # xarray's Dataset, a mapping of its variables alone: x may be one of its coordinates
+        variables = list(x.data_vars)
+        full = {"x", "y", "z"} <= {str(each).lower() for each in variables}
+        return variables if full else [*variables, *x.coords]
     if isinstance(x, Mapping):
         return list(x.keys())
-    if hasattr(x, "data_vars"):  # xarray's Dataset, where x may be a coordinate of its own
-        return [*x.data_vars, *(each for each in x.coords if each not in x.data_vars)]
     if hasattr(x, "dims") and hasattr(x, "coords"):
         along = _along(x)
         return None if along is None else [str(each) for each in x.coords[along].values]
@@ -67,7 +72,8 @@ def points(x: Any, names: list[Any], name: str) -> Array:
         columns = [_numbers(x, k, names, name) for k in range(min(6, len(names)))]
         return array_points(np.column_stack(columns), name, cure="call the columns of x, y and z so")
     axes = axes_in(told, name)
-    columns = [_numbers(x, k, names, name) for k in axes.columns]
+    turned = orders([_column(x, k, names) for k in axes.columns], x, name)
+    columns = [_numbers(x, k, names, name, order) for k, order in zip(axes.columns, turned, strict=True)]
     if len({len(column) for column in columns}) > 1:
         lengths = ", ".join(str(len(column)) for column in columns)
         raise fault(name, f"x, y and z have the lengths {lengths}", "give them equally long")
@@ -156,14 +162,14 @@ def _column(x: Any, k: int, names: list[Any]) -> Any:
     return x[names[k]]
 
 
-def _numbers(x: Any, k: int, names: list[Any], name: str) -> Array:
-    """Column `k` as float64, (N,)."""
+def _numbers(x: Any, k: int, names: list[Any], name: str, order: tuple[int, ...] | None = None) -> Array:
+    """Column `k` as float64, (N,), of its cells with their dimensions in another order if one is given."""
     values = _column(x, k, names)
     values = values.magnitude if hasattr(values, "magnitude") and hasattr(values, "units") else values  # pint
     if hasattr(values, "detach"):
         values = values.detach().cpu()
     try:
-        return np.ravel(_floats(values))
+        return np.ravel(np.transpose(_floats(values), order) if order else _floats(values))
     except (TypeError, ValueError) as error:
         refuse_clouds_in_rows(next(iter(_objects(values)), None), names[k], name)
         problem = f"column {shorten(names[k])} holds something else than numbers ({shorten(error)})"

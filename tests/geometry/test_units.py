@@ -81,6 +81,18 @@ def test_longitude_and_latitude(where: tuple[float, float]) -> None:
     assert list(said(degrees, STREET.target.points)) == ["source"]
 
 
+def test_degrees_and_millimetres_of_flat_scans_are_told_by_a_run() -> None:
+    # In degrees a town is so thin that it passed for a flat 2-D scan; walls were drawn into it, and nothing was said.
+    run = Pipeline(match="none", estimate="identity", refine="none")
+    flat = np.column_stack([STREET.source.points[:, :2], np.zeros(len(STREET.source.points))])
+    near = STREET.source.points[:, :2] / 1e5 + [8.4, 49.0]
+    degrees = np.column_stack([near, STREET.source.points[:, 2] + 100.0])
+    for points, words in ((degrees, "longitude and latitude"), (np.round(100.0 * flat), "is a whole number")):
+        with pytest.warns(UserWarning, match=words) as told:
+            run.run(Pair.of(points, points[::-1].copy()))
+        assert [str(each.message).split(":")[0] for each in told] == ["source", "target"]
+
+
 def test_a_run_warns_once_and_names_the_cloud() -> None:
     pair = Pair.of(STREET.source.points, STREET.target.points * 1000)
     with warnings.catch_warnings(record=True) as caught:

@@ -7,7 +7,7 @@ import base64
 import contextlib
 import io
 from collections import namedtuple
-from types import SimpleNamespace
+from types import MappingProxyType, SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -224,8 +224,22 @@ def test_what_is_called_unit_and_is_none() -> None:
     same(SimpleNamespace(points=P, units=None))
 
 
+@pytest.mark.parametrize("word, metres", [("fathoms", 1.8288), ("Nautical_Mile", 1852.0), ("nmi", 1852.0)])
+def test_units_of_soundings(word: str, metres: float) -> None:
+    with pytest.warns(UserWarning, match=f"its unit is {metres:g} m"):
+        cloud = PointCloud.of({**dict(zip("xyz", P.T, strict=True)), "units": word}, name="target")
+    np.testing.assert_allclose(cloud.points + cloud.offset, P * metres)
+
+
 def test_angles_and_units_that_differ_are_refused() -> None:
-    assert "'degrees_north'" in refused({**dict(zip("xyz", P.T, strict=True)), "units": "degrees_north"})
+    for angle in (
+        "degrees_north",
+        "degree_north",
+        "degree_E",
+        "degreesN",
+        "degrees_true",
+    ):  # CF's, for netCDF
+        assert f"{angle!r}" in refused({**dict(zip("xyz", P.T, strict=True)), "units": angle})
     xr = pytest.importorskip("xarray")
     units = {"x": "mm", "y": "mm", "z": "m"}
     mixed = xr.Dataset({k: ("n", v, {"units": units[k]}) for k, v in zip("xyz", P.T, strict=True)})
@@ -517,6 +531,86 @@ def test_reconstructions_of_pycolmap() -> None:
     points = {7 * k: SimpleNamespace(xyz=p, color=np.zeros(3, np.uint8)) for k, p in enumerate(P)}
     same(SimpleNamespace(points3D=points, read=lambda path: None))
     assert "empty" in refused(SimpleNamespace(points3D={}, read=lambda path: None))
+
+
+def test_clouds_with_a_reader_of_their_class() -> None:
+    # As pointcloudkit 0.1.0's, whose `PointCloud.read(path)` reads files: the cure was "pass what its read() returns".
+    class Cloud:
+        @staticmethod
+        def read(path: str) -> None: ...
+
+    class Built(Cloud):
+        @classmethod
+        def read(cls, path: str) -> None: ...
+
+    for each in (Cloud(), Built()):
+        assert "numpy.column_stack([x, y, z])" in refused(each)
+        assert "read()" not in refused(each)
+
+
+@pytest.mark.parametrize("error", [KeyError, ValueError, RuntimeError, TypeError])
+def test_types_that_raise_another_error_for_what_they_lack(error: type[Exception]) -> None:
+    # As pylas 0.4.3's clouds; the words were pylas's own, "no field of name prepared", and named no cloud.
+    class Cloud:
+        x, y, z = P.T
+
+        def __getattr__(self, asked: str) -> Any:
+            raise error(f"no field of name {asked}")
+
+    told = refused(Cloud())
+    assert f"it raises {error.__name__}, not AttributeError" in told
+    assert "numpy.column_stack([x.x, x.y, x.z])" in told
+    same(np.column_stack([Cloud.x, Cloud.y, Cloud.z]))
+
+
+def test_dictionaries_whose_attributes_are_their_entries() -> None:
+    # As configurations of networks often are; what such a one lacks was a KeyError of 'prepared'.
+    class Entries(dict[str, Any]):
+        __getattr__ = dict.__getitem__
+
+    same(Entries(zip("xyz", P.T, strict=True)))
+    same(Entries(points=P))
+    with pytest.warns(UserWarning, match="0.001 m"):
+        np.testing.assert_allclose(
+            PointCloud.of(Entries(points=P * 1000, unit="mm"), name="target").points, P
+        )
+
+
+def test_groups_that_are_no_mappings() -> None:
+    # As zarr 3.1's, whose arrays were names to numpy: "got dtype <U1".
+    class Held(np.ndarray):
+        attrs: Any = MappingProxyType({})
+
+    class Group:
+        def __init__(self, arrays: dict[str, Any], **attrs: Any) -> None:
+            self.arrays, self.attrs = arrays, attrs
+
+        def keys(self) -> Any:
+            return self.arrays.keys()
+
+        def __iter__(self) -> Any:
+            return iter(self.arrays)
+
+        def __len__(self) -> int:
+            return len(self.arrays)
+
+        def __getitem__(self, key: str) -> Any:
+            return self.arrays[key]
+
+    same(Group(dict(zip("xyz", P.T, strict=True))))
+    same(Group({"points": P}))
+    for group in (
+        Group({"points": P * 1000}, units="mm"),
+        Group(dict(zip("xyz", P.T * 1000, strict=True)), units="mm"),
+    ):
+        with pytest.warns(UserWarning, match="0.001 m"):
+            np.testing.assert_allclose(PointCloud.of(group, name="target").points, P)
+    counts = np.round(P.T * 1000).astype(np.int32)
+    scaled = Group(dict(zip("xyz", (each.view(Held) for each in counts), strict=True)))
+    for each in scaled.arrays.values():
+        each.attrs = {"scale_factor": 0.001}
+    assert "multiply them by it" in refused(scaled)
+    assert "name the coordinates x, y and z" in refused(Group({"a": P[:, 0]}))
 
 
 def test_epochs_of_py4dgeo() -> None:

@@ -22,7 +22,9 @@ _SCALE = re.compile(rf"{_OF}scal(?:e|es|ing){_TO}|quantization")
 # Of whole numbers alone: those of cells.
 _CELL = re.compile(r"(?:voxel|cell|grid)_?size|resolution|lsb")
 _OFFSET = re.compile(rf"{_OF}(?:offsets?|shift){_TO}")
-_VALID, _INVALID = re.compile(rf"(?:is_?)?valid{_TO}"), re.compile(rf"(?:is_?)?invalid{_TO}")
+_VALID = re.compile(rf"(?:is_?)?valid{_TO}")
+# LAS calls points that were deleted withheld: PDAL's `Withheld`, lazpy's `withheld_flag`.
+_INVALID = re.compile(rf"(?:is_?)?invalid{_TO}|withheld(?:_?flag)?")
 _MASK = re.compile(rf"{_OF}mask")
 _NO_POINTS = re.compile(
     r"(?:.*_)?(?:colou?rs?|rgba?|normals?|faces?|triangles?|edges?|ind(?:ex|ices)|labels?|feat(?:ure)?s?|desc(?:riptor)?s?|"

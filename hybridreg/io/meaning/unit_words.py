@@ -26,9 +26,14 @@ _METRES = {
     **dict.fromkeys(("mil", "mils", "thou"), 0.0254e-3),
     **dict.fromkeys(("yd", "yds", "yard", "yards"), 0.9144),
     **dict.fromkeys(("mi", "mile", "miles"), 1609.344),
+    # Of soundings and charts.
+    **dict.fromkeys(("fathom", "fathoms", "ftm"), 1.8288),
+    **dict.fromkeys(("nauticalmile", "nauticalmiles", "nmi"), 1852.0),
 }
 _LETTERS = re.compile(r"[a-zµμ°]+")
 ANGLES = ("deg", "degree", "degrees", "°", "rad", "radian", "radians")
+# As NetCDF's conventions (CF 1.11, 4.1) let a longitude's and a latitude's be written.
+_ON_EARTH = re.compile(r"degrees?_?(?:north|east|n|e|true)")
 # What counts, and has no length of its own.
 CELLS = (
     "px",
@@ -90,7 +95,7 @@ def metres_of(word: str, name: str) -> float | None:
         It is an angle.
     """
     lowered = word.strip().lower()
-    if lowered in ANGLES or lowered.startswith("degrees_"):
+    if lowered in ANGLES or lowered.startswith("degrees_") or _ON_EARTH.fullmatch(lowered):
         raise fault(
             name, f"the unit of its x, y and z is {shorten(word)}", "give Cartesian coordinates in metres"
         )

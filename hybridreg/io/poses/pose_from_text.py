@@ -48,7 +48,7 @@ def pose_of_text(text: str, name: str) -> Array:
     full = [k for k, line in enumerate(lines) if not line.startswith(_COMMENTS) and _NUMBERS.search(line)]
     rows = [[number_of(word, name) for word in lines[k].split()] for k in full]
     named = in_order(rows[0], text.splitlines()[: full[0]], name) if len(rows) == 1 else None
-    T = pose_of_numbers(_as_rows(rows) if named is None else named.numbers, name)
+    T = pose_of_numbers(_as_rows(rows) if named is None else named.numbers, name, ordered=named is not None)
     if named is None or not named.has_unit:
         comments = [line.strip(_MARKS) for line in text.splitlines() if line.strip().startswith(_COMMENTS)]
         T[:3, 3] = as_commented(T[None, :3, 3], [each for each in comments if not _TURNS.search(each)], name)[

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 from typing import Any
 
@@ -26,6 +27,8 @@ _BELOW = (
 )
 # How far a quaternion that was written with few digits may be from length 1; by hand.
 _ROUNDED = 0.03
+# Degrees from which a turn is one of a sensor upside down, and up to which it is hardly any; by hand.
+_OVER, _NEAR_NONE = 150.0, 30.0
 _MATRIX, _QUATERNION, _TIMED, _SIX = (12, 16), 7, 8, 6
 _ANGLES = (
     'where they are x y z roll pitch yaw in radians, write <origin xyz="x y z" rpy="roll pitch yaw"/> in their place; '
@@ -33,8 +36,9 @@ _ANGLES = (
 )
 
 
-def pose_of_numbers(values: Any, name: str) -> Array:
+def pose_of_numbers(values: Any, name: str, *, ordered: bool = False) -> Array:
     """A pose (4, 4) of sixteen or twelve numbers row after row, of the seven x y z qx qy qz qw, or of a time and those.
+    Unless it is known that they are `ordered` so, it is told where w more likely stands first.
 
     Raises
     ------
@@ -52,7 +56,10 @@ def pose_of_numbers(values: Any, name: str) -> Array:
         raise fault(name, f"holds {len(array)} poses", ONE_POSE)
     in_one_row = array.ndim == 1 or len(array) == 1
     if numbers.size in (_QUATERNION, _TIMED) and in_one_row:
-        return _placed(numbers[-7:-4], _rotation(numbers[-4:], name))
+        R = _rotation(numbers[-4:], name)
+        if not ordered:
+            _tell_order(numbers[-4:], name)
+        return _placed(numbers[-7:-4], R)
     if numbers.size not in _MATRIX:
         raise fault(name, f"holds {numbers.size} numbers", _ANGLES if numbers.size == _SIX else EXPECTED)
     T = np.eye(4)
@@ -92,6 +99,18 @@ def _rotation(quaternion: Array, name: str) -> Array:
         raise fault(name, problem, EXPECTED)
     R: Array = Rotation.from_quat(quaternion).as_matrix()
     return R
+
+
+def _tell_order(quaternion: Array, name: str) -> None:
+    # pytransform3d, nuScenes, COLMAP and MuJoCo have w first; a turn near none then reads as one near half a turn.
+    last, first = (2.0 * float(np.degrees(np.arccos(min(1.0, abs(each))))) for each in quaternion[[3, 0]])
+    if last > _OVER and first < _NEAR_NONE:
+        warnings.warn(
+            f"{name}: its last four numbers were read as qx qy qz qw, a turn of {last:.0f} degrees; if w stands first "
+            f"in them, it is one of {first:.0f} degrees: put w last then",
+            UserWarning,
+            stacklevel=4,
+        )
 
 
 def _placed(position: Array, R: Array) -> Array:

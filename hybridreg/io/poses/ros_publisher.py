@@ -45,7 +45,8 @@ def pose_of_publisher(text: str, name: str) -> NDArray[np.float64]:
     position = [told.get(each, value) for each, value in _POSITION.items()]
     if turned:
         return pose_of_angles(position, [told.get(each, value) for each, value in _ANGLES.items()])
-    return pose_of_numbers([*position, *(told.get(each, value) for each, value in _QUATERNION.items())], name)
+    turn = [told.get(each, value) for each, value in _QUATERNION.items()]
+    return pose_of_numbers([*position, *turn], name, ordered=True)
 
 
 def _in_order(words: list[str], name: str) -> NDArray[np.float64]:
@@ -61,7 +62,7 @@ def _in_order(words: list[str], name: str) -> NDArray[np.float64]:
         raise fault(name, what, ONE_POSE if poses else EXPECTED)
     numbers = poses[0]
     if len(numbers) == _BY_QUATERNION:
-        return pose_of_numbers(numbers, name)
+        return pose_of_numbers(numbers, name, ordered=True)
     return pose_of_angles(numbers[:3], numbers[:2:-1])
 
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hybridreg.io.faults import fault, foreign_parser
+from hybridreg.io.faults import FETCH_AGAIN, fault, foreign_parser
 from hybridreg.io.record_fields import stack_axes
 from hybridreg.io.recorded.recording import Recorded, Selection
 from hybridreg.runtime.optional_packages import load
@@ -17,6 +17,7 @@ from hybridreg.runtime.optional_packages import load
 Array = NDArray[np.float64]
 _CARTESIAN = ("cartesianX", "cartesianY", "cartesianZ")
 _SPHERICAL = ("sphericalRange", "sphericalAzimuth", "sphericalElevation")
+_PAGE = 1024  # bytes, the last four of them a checksum
 # 1: the direction is known and the range is not, 2: neither is (ASTM E2807).
 _STATES = ("cartesianInvalidState", "sphericalInvalidState")
 
@@ -36,7 +37,7 @@ def read_e57(path: Path, selection: Selection) -> Recorded:
     """
     name = str(path)
     pye57 = load("pye57", f"{name}: an E57 file")
-    with foreign_parser(name, "an E57 file"):
+    with foreign_parser(name, "an E57 file", _cure(path)):
         file = pye57.E57(name)
     try:
         count = int(file.scan_count)
@@ -57,6 +58,15 @@ def read_e57(path: Path, selection: Selection) -> Recorded:
         return Recorded(points)
     rows = np.repeat(np.arange(len(scans)), [len(each) for each, _ in scans])
     return Recorded(points, places, rows if len(scans) > 1 else None)
+
+
+def _cure(path: Path) -> str:
+    # Cut short, or written without checksums, as whitebox-workflows 2.0.6 does: no copy of that can be opened.
+    size = path.stat().st_size if path.is_file() else 0
+    if size % _PAGE:
+        pages = f"E57 has whole pages of {_PAGE} bytes, this file {size} bytes"
+        return f"{FETCH_AGAIN} ({pages}); if it was written so, export it as LAS or PLY instead"
+    return FETCH_AGAIN
 
 
 def _scan(file: Any, row: int, name: str) -> tuple[Array, Array | None]:

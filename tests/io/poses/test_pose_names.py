@@ -147,3 +147,37 @@ def test_comments_about_angles_and_metres_change_nothing(tmp_path: Path) -> None
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         np.testing.assert_allclose(read_pose(path), POSE, rtol=0, atol=1e-14)
+
+
+@pytest.mark.parametrize("ending", ["npy", "json", "txt", "tum"])
+def test_a_turn_near_none_with_w_first_is_told(tmp_path: Path, ending: str) -> None:
+    # As pytransform3d 3.17.0's `pq_from_transform` has them: no turn was half a turn about x, in silence.
+    path, row = tmp_path / f"pose.{ending}", [*PLACE, 0.999, 0.02, 0.03, -0.025]
+    if ending == "npy":
+        np.save(path, row)
+    elif ending == "json":
+        path.write_text(json.dumps({"T_target_source": row}))
+    else:
+        path.write_text(" ".join(map(str, [0.0, *row] if ending == "tum" else row)))
+    with pytest.warns(
+        UserWarning, match="a turn of 177 degrees; if w stands first in them, it is one of 5 degrees"
+    ):
+        read_pose(path)
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize(
+    "text",
+    [
+        f"# x y z qx qy qz qw\n{T} 1 0 0 0",  # a sensor that hangs
+        f"# x y z qw qx qy qz\n{T} 1 0 0 0",
+        "ros2 run tf2_ros static_transform_publisher --x 1 --qx 1 --qw 0",
+        f"rosrun tf static_transform_publisher {T} 1 0 0 0 a b 100",
+        f"{T} 0 0 0 1",
+        f"{T} 0 1 0 0",
+        f"{T} 0.6 0 0 0.8",
+    ],
+)
+def test_an_order_that_is_known_or_likely_is_not_doubted(tmp_path: Path, text: str) -> None:
+    (tmp_path / "pose.txt").write_text(text)
+    read_pose(tmp_path / "pose.txt")

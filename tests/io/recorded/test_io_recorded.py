@@ -440,6 +440,23 @@ def test_helipr_by_name(tmp_path: Path, sensor: str, stamp: int, rest: int) -> N
 # --- what is not what it says, what is not installed, what cannot be chosen
 
 
+def test_e57_without_its_pages_is_told_so(stations: Any) -> None:
+    # As whitebox-workflows 2.0.6 writes them, without checksums: no copy of such a file can be opened.
+    path = stations[0]
+    whole = path.read_bytes()
+    assert len(whole) % 1024 == 0
+    bare = b"".join(whole[k : k + 1020] for k in range(0, len(whole), 1024))[:-7]
+    for data in (bare, whole[:-500]):
+        path.write_bytes(data)
+        with pytest.raises(
+            ValueError, match=rf"this file {len(data)} bytes.*export it as LAS or PLY instead"
+        ):
+            read_points(path)
+    path.write_bytes(whole[:2000] + b"?" + whole[2001:])  # pages there, damaged
+    with pytest.raises(ValueError, match="copy, download or export it again$"):
+        read_points(path)
+
+
 @pytest.mark.parametrize("ending", ["e57", "bag", "db3", "mcap", "parquet", "feather", "glb", "lvx2"])
 def test_other_content_never_reaches_other_peoples_readers(tmp_path: Path, ending: str) -> None:
     path = tmp_path / f"a.{ending}"
