@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from hybridreg.evidence import information, traffic
 from hybridreg.evidence.agreement import Agreement, compare
-from hybridreg.evidence.deformation import motion_distortion, range_offset, scale, stretch
+from hybridreg.evidence.deformation import bend, motion_distortion, range_offset, scale, stretch
+from hybridreg.evidence.deformation.bend import Bend
 from hybridreg.evidence.deformation.deformed import Deformed, Onto, closeness_of, rigidly
 from hybridreg.evidence.deformation.motion_distortion import MotionDistortion
 from hybridreg.evidence.deformation.range_offset import RangeOffset
@@ -72,6 +73,11 @@ class PoseEvidence:
     def motion_distortion(self) -> MotionDistortion | None:
         """How a sensor moved while it measured, if one did."""
         return motion_distortion.motion_distortion(self.views, self.T)
+
+    @cached_property
+    def bend(self) -> Bend | None:
+        """How far away a part of a map lies better, if one does."""
+        return bend.bend(self.views, self.T)
 
     def _explained(self, fitted: Array) -> bool:
         # Whether an offset of the ranges, or a sensor's motion, lets the clouds lie as closely as another deformation

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from hybridreg.evidence import corner, lone_thing
 from hybridreg.evidence.covariance import of_information
+from hybridreg.evidence.deformation.bend import Bend
 from hybridreg.evidence.deformation.motion_distortion import MotionDistortion
 from hybridreg.evidence.deformation.range_offset import RangeOffset
 from hybridreg.evidence.deformation.stretch import Stretch
@@ -60,6 +61,8 @@ class Doubts:
         The offset of its ranges at which it fits clearly better; no doubt where that lies within the tolerance.
     motion_distortion : MotionDistortion or None
         How a sensor moved while it measured; no doubt where the pose lies within the tolerance.
+    bend : Bend or None
+        How far away a part of a map lies better.
     traffic : (3,) float64 or None
         Direction along which vehicles alone hold the pose.
     """
@@ -73,6 +76,7 @@ class Doubts:
     stretch: Stretch | None = None
     range_offset: RangeOffset | None = None
     motion_distortion: MotionDistortion | None = None
+    bend: Bend | None = None
     traffic: Array | None = None
 
     def __bool__(self) -> bool:
@@ -88,7 +92,8 @@ class Doubts:
     def about_source(self) -> bool:
         """Whether a cloud is deformed, so that no pose is right."""
         known = (self.range_offset, self.motion_distortion)
-        return self.stretch is not None or any(one is not None and one.beyond for one in known)
+        beyond = any(one is not None and one.beyond for one in known)
+        return self.stretch is not None or self.bend is not None or beyond
 
     @classmethod
     def about(
@@ -116,6 +121,7 @@ class Doubts:
             if offset is not None and offset.told and not strained and not moved
             else None,
             motion_distortion=moved,
+            bend=None if strained else at.bend,
             traffic=None if scene.pair.drawn else at.traffic,
         )
 

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybridreg.evidence.agreement import Agreement
+from hybridreg.evidence.deformation.bend import Bend
 from hybridreg.evidence.deformation.motion_distortion import MotionDistortion
 from hybridreg.evidence.deformation.range_offset import RangeOffset
 from hybridreg.evidence.deformation.stretch import Stretch
@@ -70,6 +71,7 @@ def reasons(
         *_strained(evidence, doubts.stretch),
         *_off_in_range(doubts.range_offset),
         *_in_motion(doubts.motion_distortion),
+        *_bent(doubts.bend),
         *_with_traffic(doubts.traffic),
         *_against(evidence, agreement, held, doubts.through_walls),
         *_from_one_side(doubts.lone_thing),
@@ -179,6 +181,15 @@ def _in_motion(motion: MotionDistortion | None) -> Iterator[str]:
             f"the {motion.side} fits better when its sensor turned by {motion.degrees:.1f} deg and moved by "
             f"{motion.metres:.2f} m within one sweep{harm}: undo its motion by the times of its points (deskew it) "
             "before it is registered"
+        )
+
+
+def _bent(bend: Bend | None) -> Iterator[str]:
+    if bend is not None:
+        yield (
+            f"a part of the clouds fits better {bend.metres:.2g} m and {bend.degrees:.1f} deg away from where the pose "
+            "lays it, so that no rigid pose is right: does a map drift or bend? Close its loops, or register smaller "
+            "parts"
         )
 
 
