@@ -99,6 +99,15 @@ def test_heights_in_another_unit_are_told(real_data: Path, name: str, factor: fl
     assert abs(np.log(found.factor * factor)) < 0.15
 
 
+@pytest.mark.parametrize("factor", [0.9, 1.1])
+@pytest.mark.parametrize("name", ["kitti-odo-5-to-0", "hdl32-small-gicp"])
+def test_heights_a_tenth_off_are_told(real_data: Path, name: str, factor: float) -> None:
+    made = load_pair(real_data / name)
+    result = hr.register(made.pair.source.points * [1.0, 1.0, factor], made.pair.target.points)
+    assert result.verdict == "doubtful"
+    assert any("fits better when it is stretched by" in reason for reason in result.reasons)
+
+
 @pytest.mark.parametrize("metres", [1.0, 0.5, -0.5, 0.3])
 @pytest.mark.parametrize("name", ["kitti-city-20-to-0", "opencalib-hesai1-qt202-to-p64"])
 def test_an_offset_of_all_ranges_is_measured(real_data: Path, name: str, metres: float) -> None:

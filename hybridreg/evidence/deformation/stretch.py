@@ -3,8 +3,8 @@
 
 No rigid pose is right then, and the best one is a compromise: of a source stretched by 5 % nearly all points find a
 neighbour, and its middle may lie a metre from where it belongs. Scans taken in motion, maps that drift, axes with
-factors of their own and heights in another unit are strained so. Of heights only great strains count: most points lie
-on the ground, and those of right poses often fit best when they are strained by several per cent.
+factors of their own and heights in another unit are strained so. Of heights small strains do not count: most points
+lie on the ground, and those of right poses often fit best when they are strained by several per cent.
 """
 
 from __future__ import annotations
@@ -32,8 +32,10 @@ _FARTHER = 90.0
 _ALIKE = 0.5
 # Factors beyond this are no strain of a scan; by hand.
 _MOST = 0.15
-# Factors of the heights within this are none; of 18 right poses of real pairs none is strained by more than 0.05.
-_HEIGHTS = 0.15
+# Factors of the heights within this are none. Of 18 right poses of real pairs none is strained by more than 0.05; of 122
+# others (`sim:val`, hard kinds with even seeds) half are, and three of them, strained by more than 0.15, lie more closely
+# by `_GAIN` for that: in a tunnel, on a field, and in a map that holds its place twice.
+_HEIGHTS = 0.07
 # Factors beyond this, or below one over it, lay a field flat: no unit of heights differs so much; by hand.
 _TALLEST = 3.5
 
