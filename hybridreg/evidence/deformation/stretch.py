@@ -32,9 +32,9 @@ _FARTHER = 90.0
 _ALIKE = 0.5
 # Factors beyond this are no strain of a scan; by hand.
 _MOST = 0.15
-# Factors of the heights within this are none. Of 18 right poses of real pairs none is strained by more than 0.05; of 122
-# others (`sim:val`, hard kinds with even seeds) half are, and three of them, strained by more than 0.15, lie more closely
-# by `_GAIN` for that: in a tunnel, on a field, and in a map that holds its place twice.
+# Factors of the heights within this are none. Of 18 right poses of real pairs none is strained by more than 0.05; of
+# 122 others (`sim:val`, hard kinds with even seeds) half are, and three of them, strained by more than 0.15, lie more
+# closely by `_GAIN` for that: in a tunnel, on a field, and in a map that holds its place twice.
 _HEIGHTS = 0.07
 # Factors beyond this, or below one over it, lay a field flat: no unit of heights differs so much; by hand.
 _TALLEST = 3.5
