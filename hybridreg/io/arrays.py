@@ -16,6 +16,7 @@ from hybridreg.io.meaning.beside_points import with_what_is_beside
 from hybridreg.io.meaning.first_column import FEWEST, check_first_column
 from hybridreg.io.meaning.image_shapes import check_photo, refuse_image
 from hybridreg.io.meaning.spherical import tell_spherical
+from hybridreg.io.meaning.stacked_clouds import tell_stack
 from hybridreg.io.meaning.unit_words import known_metres
 from hybridreg.io.record_fields import stack_axes
 
@@ -76,8 +77,10 @@ def _rows(array: NDArray[Any], name: str, batched: bool) -> NDArray[Any]:
             raise fault(
                 name, f"expected an array of shape (N, 3), got {shape}: one cloud or {shape[0]}?", cure
             )
+        if shape[0] > 1 and shape[1] >= FEWEST:
+            tell_stack(array, name)
         return array.reshape(-1, shape[2])
-    if array.ndim == 3 and shape[0] in range(3, _MOST_CHANNELS + 1) and not batched:
+    if _is_channels(shape) and not batched:
         return array.reshape(shape[0], -1).T
     if array.ndim == 2 and shape[1] >= 3:
         if shape[0] < FEWEST <= shape[1]:
@@ -91,6 +94,12 @@ def _rows(array: NDArray[Any], name: str, batched: bool) -> NDArray[Any]:
     if flat.ndim == 2 and min(flat.shape) > _MOST_CHANNELS:
         refuse_image(flat.shape[0], flat.shape[1], name)
     raise fault(name, f"expected an array of shape (N, 3), got {shape}", _shape_cure(array, batched))
+
+
+def _is_channels(shape: tuple[int, ...]) -> bool:
+    # Three rows of many points are x, y and z of several clouds, (B, 3, N), as networks take them.
+    batch = len(shape) == 3 and shape[1] in range(3, _MOST_CHANNELS + 1) and shape[2] >= FEWEST
+    return len(shape) == 3 and shape[0] in range(3, _MOST_CHANNELS + 1) and not batch
 
 
 def _refuse_poses(array: NDArray[Any], name: str) -> None:
@@ -120,6 +129,9 @@ def _shape_cure(array: NDArray[Any], batched: bool) -> str:
         return f"give one cloud of the batch, a point a row: x[0].reshape({shape[1]}, -1).T"
     if array.ndim == 3 and shape[0] in channels and shape[2] > _MOST_CHANNELS and batched:
         return f"if its {shape[0]} images are x, y and z, give a point a row: x.reshape({shape[0]}, -1).T"
+    if array.ndim == 3 and shape[1] in channels and shape[2] >= FEWEST:
+        other = f"; if each is one axis, x.reshape({shape[0]}, -1).T" if shape[0] in channels else ""
+        return f"if they are {shape[0]} clouds, give one, a point a row: x[0].T{other}"
     if array.ndim == 3 and array.shape[2] >= 3 and batched:
         return "give one cloud of the batch, x[0]"
     if array.ndim == 1 and array.size and array.size % 3 == 0:
