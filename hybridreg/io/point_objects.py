@@ -22,6 +22,7 @@ from hybridreg.io.coordinate_systems.length_unit import in_metres
 from hybridreg.io.formats.las_withheld import flags_withheld, without_withheld
 from hybridreg.io.list_columns import listed_points, without_records
 from hybridreg.io.meaning.beside_points import refuse_second_cloud, with_what_is_beside
+from hybridreg.io.meaning.grids import refuse_grid
 from hybridreg.io.meaning.length_units import unit_given
 from hybridreg.io.recorded import ros_messages, vtk_objects
 
@@ -66,7 +67,7 @@ def points_of(x: Any, name: str, depth: int = 0) -> Array:
             x.point["positions"].cpu().numpy() if "positions" in x.point else np.empty((0, 3)), name
         )
     names = tables.labels(x)
-    _refuse_grid(x, names, name)
+    refuse_grid(x, names, name)
     if names is not None:
         return _from_table(x, names, name, depth)
     if vtk_objects.is_vtk(x):
@@ -218,19 +219,6 @@ def _named_rows(rows: Any) -> Any:
         told = ("x", "y", "z", *(["withheld"] if hasattr(first, "withheld") else []))  # copclib's points
         return {each: [getattr(row, each) for row in rows] for each in told}
     return None
-
-
-def _refuse_grid(x: Any, names: list[Any] | None, name: str) -> None:
-    # xarray's: heights or ranges over the dimensions x and y, which are their coordinates.
-    flat = {str(each).lower() for each in getattr(x, "dims", ())}
-    if (
-        not {"x", "y"} <= flat
-        or not hasattr(x, "to_dataframe")
-        or {"x", "y", "z"} <= {*map(str, getattr(x, "data_vars", names) or ())}
-    ):
-        return
-    call = "to_dataframe()" if hasattr(x, "data_vars") else 'to_dataframe("z")'
-    _refuse(x, name, f"it is a grid over x and y, not points; if it holds heights: x.{call}.reset_index()")
 
 
 def _refuse_mesh(x: Any, name: str) -> None:
