@@ -14,6 +14,7 @@ from hybridreg.io.coordinate_systems.length_unit import in_metres
 from hybridreg.io.faults import fault
 from hybridreg.io.meaning.beside_points import with_what_is_beside
 from hybridreg.io.meaning.first_column import FEWEST, check_first_column
+from hybridreg.io.meaning.homogeneous import refuse_homogeneous
 from hybridreg.io.meaning.image_shapes import check_photo, refuse_image
 from hybridreg.io.meaning.spherical import tell_spherical
 from hybridreg.io.meaning.stacked_clouds import tell_stack
@@ -60,6 +61,7 @@ def array_points(array: NDArray[Any], name: str, *, batched: bool = False, cure:
         raise fault(name, f"coordinates must be numbers, got dtype {_short(array)}", _as_numbers(array))
     rows = _rows(array, name, batched)
     tell_spherical(rows, name)
+    refuse_homogeneous(rows, name, _divided(array))
     check_first_column(rows, name, cure or f"leave it out: give columns 2 to 4, {_without_first(array)}")
     return _numbers(rows[:, :3])
 
@@ -117,8 +119,15 @@ def _refuse_poses(array: NDArray[Any], name: str) -> None:
 
 
 def _without_first(array: NDArray[Any]) -> str:
-    channels = array.shape[0] in range(3, _MOST_CHANNELS + 1) and array.shape[-1] > _MOST_CHANNELS
-    return "x[1:4]" if channels else "x[..., 1:4]"
+    return "x[1:4]" if _channels_first(array) else "x[..., 1:4]"
+
+
+def _divided(array: NDArray[Any]) -> str:
+    return "x[:3] / x[3]" if _channels_first(array) else "x[..., :3] / x[..., 3:]"
+
+
+def _channels_first(array: NDArray[Any]) -> bool:
+    return array.shape[0] in range(3, _MOST_CHANNELS + 1) and array.shape[-1] > _MOST_CHANNELS
 
 
 def _shape_cure(array: NDArray[Any], batched: bool) -> str:
