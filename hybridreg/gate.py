@@ -25,8 +25,10 @@ OR_DROP = ' or pass nonfinite="drop"'
 _LOT = 2**18  # points
 _LACKED = "hybridreg_asks_for_what_nothing_has"
 _FILLED = 0.01  # share of points exactly at one place from which they count as missing returns
-# Heights that rasters write for cells without data; other points must be far above them.
-_NO_HEIGHT = (-9999.0, -99999.0, -32768.0, -32767.0)
+# Heights that rasters write for cells without data, 1,000,000 of them BAG; other points must be far from them.
+_NO_HEIGHT = frozenset(
+    s * h for h in (999.0, 9999.0, 99999.0, 999999.0, 32767.0, 32768.0, 1e6) for s in (-1.0, 1.0)
+)
 _COARSE = 0.01  # metres between coordinates from which their rounding is reported
 _TINY = 1e-12  # metres, for the logarithm of zero
 _WHOLE = 1e-6  # of a digit, off by which a decimal number in double precision may be
@@ -132,21 +134,22 @@ def _away_from(
 def _measured(
     points: Array, rows: NDArray[np.bool_] | None, name: str, *, drop: bool
 ) -> tuple[Array, NDArray[np.bool_] | None]:
-    lowest = float(points[:, 2].min(initial=0.0))
-    if lowest not in _NO_HEIGHT:
-        return points, rows
-    good = points[:, 2] != lowest
-    if not good.any() or points[good, 2].min() < 0.5 * lowest:
-        return points, rows
-    if drop:
-        return points[good], _kept(rows, good)
-    n_bad = len(points) - int(good.sum())
-    warnings.warn(
-        f"{name}: {n_bad} of {len(points)} points have the height {lowest:g}, which rasters write for cells without "
-        f"data; remove them{OR_DROP}",
-        UserWarning,
-        stacklevel=5,
-    )
+    for height in (float(points[:, 2].min(initial=0.0)), float(points[:, 2].max(initial=0.0))):
+        if height not in _NO_HEIGHT:
+            continue
+        good = points[:, 2] != height
+        if not good.any() or (np.sign(height) * points[good, 2]).max() > 0.5 * abs(height):
+            continue
+        if drop:
+            points, rows = points[good], _kept(rows, good)
+            continue
+        n_bad = len(points) - int(good.sum())
+        warnings.warn(
+            f"{name}: {n_bad} of {len(points)} points have the height {height:.12g}, which rasters write for cells "
+            f"without data; remove them{OR_DROP}",
+            UserWarning,
+            stacklevel=5,
+        )
     return points, rows
 
 
