@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from hybridreg.io.meaning.shared_place import shared_place
 from hybridreg.io.point_objects import points_of
 
 Array = NDArray[np.float64]
@@ -23,9 +24,11 @@ _THINNEST = 1e-6
 OR_DROP = ' or pass nonfinite="drop"'
 _LOT = 2**18  # points
 _LACKED = "hybridreg_asks_for_what_nothing_has"
-_FILLED = 0.01  # share of points exactly at the origin from which they count as missing returns
-# Heights that rasters write for cells without data; other points must be far above them.
-_NO_HEIGHT = (-9999.0, -99999.0, -32768.0, -32767.0)
+_FILLED = 0.01  # share of points exactly at one place from which they count as missing returns
+# Heights that rasters write for cells without data, 1,000,000 of them BAG; other points must be far from them.
+_NO_HEIGHT = frozenset(
+    s * h for h in (999.0, 9999.0, 99999.0, 999999.0, 32767.0, 32768.0, 1e6) for s in (-1.0, 1.0)
+)
 _COARSE = 0.01  # metres between coordinates from which their rounding is reported
 _TINY = 1e-12  # metres, for the logarithm of zero
 _WHOLE = 1e-6  # of a digit, off by which a decimal number in double precision may be
@@ -91,46 +94,62 @@ def finite(points: Array, name: str, *, drop: bool) -> tuple[Array, NDArray[np.b
 def returned(
     points: Array, rows: NDArray[np.bool_] | None, name: str, *, drop: bool
 ) -> tuple[Array, NDArray[np.bool_] | None]:
-    """Warn of many points exactly at (0, 0, 0), which drivers write for missing returns, and of heights that rasters
-    write for cells without data, or drop them on request. `rows` (N,) are those that `finite` kept; the result is of
-    the same form."""
+    """Warn of many points exactly at (0, 0, 0), which drivers write for missing returns, or at another place, and of
+    heights that rasters write for cells without data, or drop them on request.
+
+    `rows` (N,) are those that `finite` kept; the result is of the same form.
+    """
     points, rows = _measured(points, rows, name, drop=drop)
-    fewest = max(MIN_POINTS, _FILLED * len(points))
-    if np.count_nonzero(points[:, 0] == 0.0) < fewest:
+    points, rows = _away_from(
+        np.zeros(3), "which drivers write for missing returns", points, rows, name, drop=drop
+    )
+    place = shared_place(points)
+    if place is None:
         return points, rows
-    good: NDArray[np.bool_] = np.asarray(points.any(axis=1))
+    why = "as missing returns do that were moved with the others, and padding does"
+    return _away_from(place, why, points, rows, name, drop=drop)
+
+
+def _away_from(
+    place: Array, why: str, points: Array, rows: NDArray[np.bool_] | None, name: str, *, drop: bool
+) -> tuple[Array, NDArray[np.bool_] | None]:
+    fewest = max(MIN_POINTS, _FILLED * len(points))
+    if np.count_nonzero(points[:, 0] == place[0]) < fewest:
+        return points, rows
+    good: NDArray[np.bool_] = np.asarray((points != place).any(axis=1))
     n_bad = len(points) - int(good.sum())
     if n_bad < fewest or n_bad == len(points):
         return points, rows
-    if not drop:
-        warnings.warn(
-            f"{name}: {n_bad} of {len(points)} points lie exactly at (0, 0, 0), which drivers write for missing "
-            f"returns; remove them{OR_DROP}",
-            UserWarning,
-            stacklevel=4,
-        )
-        return points, rows
-    return points[good], _kept(rows, good)
+    if drop:
+        return points[good], _kept(rows, good)
+    where = ", ".join(f"{each:.6g}" for each in place)
+    warnings.warn(
+        f"{name}: {n_bad} of {len(points)} points lie exactly at ({where}), {why}; remove them{OR_DROP}",
+        UserWarning,
+        stacklevel=5,
+    )
+    return points, rows
 
 
 def _measured(
     points: Array, rows: NDArray[np.bool_] | None, name: str, *, drop: bool
 ) -> tuple[Array, NDArray[np.bool_] | None]:
-    lowest = float(points[:, 2].min(initial=0.0))
-    if lowest not in _NO_HEIGHT:
-        return points, rows
-    good = points[:, 2] != lowest
-    if not good.any() or points[good, 2].min() < 0.5 * lowest:
-        return points, rows
-    if drop:
-        return points[good], _kept(rows, good)
-    n_bad = len(points) - int(good.sum())
-    warnings.warn(
-        f"{name}: {n_bad} of {len(points)} points have the height {lowest:g}, which rasters write for cells without "
-        f"data; remove them{OR_DROP}",
-        UserWarning,
-        stacklevel=5,
-    )
+    for height in (float(points[:, 2].min(initial=0.0)), float(points[:, 2].max(initial=0.0))):
+        if height not in _NO_HEIGHT:
+            continue
+        good = points[:, 2] != height
+        if not good.any() or (np.sign(height) * points[good, 2]).max() > 0.5 * abs(height):
+            continue
+        if drop:
+            points, rows = points[good], _kept(rows, good)
+            continue
+        n_bad = len(points) - int(good.sum())
+        warnings.warn(
+            f"{name}: {n_bad} of {len(points)} points have the height {height:.12g}, which rasters write for cells "
+            f"without data; remove them{OR_DROP}",
+            UserWarning,
+            stacklevel=5,
+        )
     return points, rows
 
 

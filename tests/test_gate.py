@@ -257,3 +257,16 @@ def test_a_stray_point_far_away_is_no_map() -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         PointCloud.of(points, name="scan")
+
+
+@pytest.mark.parametrize("height", [-9999.0, -999.0, -999999.0, -32767.0, 9999.0, 99999.0, 1e6])
+def test_heights_of_cells_without_data(height: float) -> None:
+    # -999 and those above the others, as BAG's 1,000,000, were read as points.
+    z = GOOD[:, 2] + (600.0 if height < 0.0 else 300.0)
+    empty = np.c_[GOOD[:, :2], np.where(np.arange(50) % 9 == 4, height, z)]
+    with pytest.warns(UserWarning, match=f"of 50 points have the height {height:.12g}, which rasters write"):
+        PointCloud.of(empty)
+    assert len(PointCloud.of(empty, nonfinite="drop")) == 44
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        PointCloud.of(np.c_[GOOD[:, :2], np.where(np.arange(50) == 4, height, 0.8 * height + GOOD[:, 2])])

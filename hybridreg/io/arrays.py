@@ -14,8 +14,10 @@ from hybridreg.io.coordinate_systems.length_unit import in_metres
 from hybridreg.io.faults import fault
 from hybridreg.io.meaning.beside_points import with_what_is_beside
 from hybridreg.io.meaning.first_column import FEWEST, check_first_column
+from hybridreg.io.meaning.homogeneous import refuse_homogeneous
 from hybridreg.io.meaning.image_shapes import check_photo, refuse_image
 from hybridreg.io.meaning.spherical import tell_spherical
+from hybridreg.io.meaning.stacked_clouds import tell_stack
 from hybridreg.io.meaning.unit_words import known_metres
 from hybridreg.io.record_fields import stack_axes
 
@@ -59,6 +61,7 @@ def array_points(array: NDArray[Any], name: str, *, batched: bool = False, cure:
         raise fault(name, f"coordinates must be numbers, got dtype {_short(array)}", _as_numbers(array))
     rows = _rows(array, name, batched)
     tell_spherical(rows, name)
+    refuse_homogeneous(rows, name, _divided(array))
     check_first_column(rows, name, cure or f"leave it out: give columns 2 to 4, {_without_first(array)}")
     return _numbers(rows[:, :3])
 
@@ -76,8 +79,10 @@ def _rows(array: NDArray[Any], name: str, batched: bool) -> NDArray[Any]:
             raise fault(
                 name, f"expected an array of shape (N, 3), got {shape}: one cloud or {shape[0]}?", cure
             )
+        if shape[0] > 1 and shape[1] >= FEWEST:
+            tell_stack(array, name)
         return array.reshape(-1, shape[2])
-    if array.ndim == 3 and shape[0] in range(3, _MOST_CHANNELS + 1) and not batched:
+    if _is_channels(shape) and not batched:
         return array.reshape(shape[0], -1).T
     if array.ndim == 2 and shape[1] >= 3:
         if shape[0] < FEWEST <= shape[1]:
@@ -91,6 +96,12 @@ def _rows(array: NDArray[Any], name: str, batched: bool) -> NDArray[Any]:
     if flat.ndim == 2 and min(flat.shape) > _MOST_CHANNELS:
         refuse_image(flat.shape[0], flat.shape[1], name)
     raise fault(name, f"expected an array of shape (N, 3), got {shape}", _shape_cure(array, batched))
+
+
+def _is_channels(shape: tuple[int, ...]) -> bool:
+    # Three rows of many points are x, y and z of several clouds, (B, 3, N), as networks take them.
+    batch = len(shape) == 3 and shape[1] in range(3, _MOST_CHANNELS + 1) and shape[2] >= FEWEST
+    return len(shape) == 3 and shape[0] in range(3, _MOST_CHANNELS + 1) and not batch
 
 
 def _refuse_poses(array: NDArray[Any], name: str) -> None:
@@ -108,8 +119,15 @@ def _refuse_poses(array: NDArray[Any], name: str) -> None:
 
 
 def _without_first(array: NDArray[Any]) -> str:
-    channels = array.shape[0] in range(3, _MOST_CHANNELS + 1) and array.shape[-1] > _MOST_CHANNELS
-    return "x[1:4]" if channels else "x[..., 1:4]"
+    return "x[1:4]" if _channels_first(array) else "x[..., 1:4]"
+
+
+def _divided(array: NDArray[Any]) -> str:
+    return "x[:3] / x[3]" if _channels_first(array) else "x[..., :3] / x[..., 3:]"
+
+
+def _channels_first(array: NDArray[Any]) -> bool:
+    return array.shape[0] in range(3, _MOST_CHANNELS + 1) and array.shape[-1] > _MOST_CHANNELS
 
 
 def _shape_cure(array: NDArray[Any], batched: bool) -> str:
@@ -120,6 +138,9 @@ def _shape_cure(array: NDArray[Any], batched: bool) -> str:
         return f"give one cloud of the batch, a point a row: x[0].reshape({shape[1]}, -1).T"
     if array.ndim == 3 and shape[0] in channels and shape[2] > _MOST_CHANNELS and batched:
         return f"if its {shape[0]} images are x, y and z, give a point a row: x.reshape({shape[0]}, -1).T"
+    if array.ndim == 3 and shape[1] in channels and shape[2] >= FEWEST:
+        other = f"; if each is one axis, x.reshape({shape[0]}, -1).T" if shape[0] in channels else ""
+        return f"if they are {shape[0]} clouds, give one, a point a row: x[0].T{other}"
     if array.ndim == 3 and array.shape[2] >= 3 and batched:
         return "give one cloud of the batch, x[0]"
     if array.ndim == 1 and array.size and array.size % 3 == 0:

@@ -22,7 +22,8 @@ from hybridreg.io.coordinate_systems.length_unit import in_metres
 from hybridreg.io.formats.las_withheld import flags_withheld, without_withheld
 from hybridreg.io.list_columns import listed_points, without_records
 from hybridreg.io.meaning.beside_points import refuse_second_cloud, with_what_is_beside
-from hybridreg.io.meaning.length_units import unit_given
+from hybridreg.io.meaning.grids import refuse_grid
+from hybridreg.io.meaning.length_units import one_unit, unit_given
 from hybridreg.io.recorded import ros_messages, vtk_objects
 
 Array = NDArray[np.float64]
@@ -66,14 +67,15 @@ def points_of(x: Any, name: str, depth: int = 0) -> Array:
             x.point["positions"].cpu().numpy() if "positions" in x.point else np.empty((0, 3)), name
         )
     names = tables.labels(x)
-    _refuse_grid(x, names, name)
+    refuse_grid(x, names, name)
     if names is not None:
         return _from_table(x, names, name, depth)
     if vtk_objects.is_vtk(x):
         return _from_vtk(x, name)
     clouds = _clouds_of_scene(x)
     if clouds is not None:
-        return _from_array(clouds, name)
+        said = one_unit((unit_given(each, name) for each in x.geometry.values()), name)
+        return in_metres(_from_array(clouds, name), said, name)
     _refuse_mesh(x, name)
     if hasattr(getattr(x, "header", None), "vlrs") and hasattr(x, "xyz"):  # laspy
         points = without_withheld(_from_array(np.asarray(x.xyz), name), flags_withheld(x), name)
@@ -220,31 +222,23 @@ def _named_rows(rows: Any) -> Any:
     return None
 
 
-def _refuse_grid(x: Any, names: list[Any] | None, name: str) -> None:
-    # xarray's: heights or ranges over the dimensions x and y, which are their coordinates.
-    flat = {str(each).lower() for each in getattr(x, "dims", ())}
-    if (
-        not {"x", "y"} <= flat
-        or not hasattr(x, "to_dataframe")
-        or {"x", "y", "z"} <= {*map(str, getattr(x, "data_vars", names) or ())}
-    ):
-        return
-    call = "to_dataframe()" if hasattr(x, "data_vars") else 'to_dataframe("z")'
-    _refuse(x, name, f"it is a grid over x and y, not points; if it holds heights: x.{call}.reset_index()")
-
-
 def _refuse_mesh(x: Any, name: str) -> None:
+    # An array has no unit.
+    metres = unit_given(x, name)
+    factor = "" if metres in (None, 1.0) else f" * {metres:.9g}"
     if hasattr(x, "geometry") and callable(getattr(x, "to_mesh", None)):
-        _refuse(x, name, "a scene is not a cloud; sample its surfaces: x.to_mesh().sample(100_000)")
+        _refuse(x, name, f"a scene is not a cloud; sample its surfaces: x.to_mesh().sample(100_000){factor}")
     if callable(getattr(x, "current_mesh", None)):  # pymeshlab's sets
         _refuse(x, name, "it holds several meshes; give one of them, x.current_mesh()")
     if not _has_faces(x):
         return
     sample = "sample_points_uniformly" if hasattr(x, "sample_points_uniformly") else "sample"
     vertices = next((words for held, words in _VERTICES.items() if hasattr(x, held)), "x.points")
-    how = f"sample its surface, x.{sample}(100_000)" if hasattr(x, sample) else "sample its surface"
+    how = f"sample its surface, x.{sample}(100_000){factor}" if hasattr(x, sample) else "sample its surface"
     _refuse(
-        x, name, f"a mesh is not a cloud; {how}, or pass its vertices, {vertices}, where they lie densely"
+        x,
+        name,
+        f"a mesh is not a cloud; {how}, or pass its vertices, {vertices}{factor}, where they lie densely",
     )
 
 

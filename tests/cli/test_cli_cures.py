@@ -64,6 +64,12 @@ def test_every_phrase_is_one_that_the_library_says() -> None:
             "save one cloud of the batch, a point a row, of the file's array x: x[0].reshape(-1, 3)",
         ),
         (np.ones((2, 3, 20, 25)), "of the file's array x: x[0].reshape(3, -1).T"),
+        (np.ones((8, 3, 50)), "save one, a point a row, of the file's array x: x[0].T"),
+        (
+            np.random.default_rng(0).uniform(size=(9, 50, 3)),
+            "save one of the file's array x, x[0], to a file",
+        ),
+        (np.full((50, 4), 0.5), "by the fourth, and save the file again with x[..., :3] / x[..., 3:]"),
         (
             np.zeros(60, [(axis, "f4", 2) for axis in "xyz"]),
             "and save the file again with numpy.column_stack([x[",

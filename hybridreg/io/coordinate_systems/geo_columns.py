@@ -36,8 +36,9 @@ def unit_of_schema(schema: Any) -> LengthUnit | None:
 def coordinates_of(x: str, unit: LengthUnit) -> str:
     """The Python that gives x, y and z in metres of geopandas' frame `x`, whose system has that unit."""
     moved = f"{x}.to_crs({x}.estimate_utm_crs())" if unit.degrees or unit.stretched else x
-    metres = (unit.across, unit.across, unit.up)
-    factor = "" if moved != x or set(metres) == {1.0} else f" * {[float(f'{each:.9g}') for each in metres]}"
+    across = unit.across if moved == x else 1.0  # heights stay as they are
+    metres = (across, across, unit.up)
+    factor = "" if set(metres) == {1.0} else f" * {[float(f'{each:.9g}') for each in metres]}"
     return f"{moved}.get_coordinates(include_z=True){factor}"
 
 

@@ -25,7 +25,7 @@ def unit_of_keys(keys: Mapping[int, int]) -> LengthUnit:
     """
     projected = _ACROSS in keys or _ACROSS_UNIT in keys
     if keys.get(_MODEL) == _GEOGRAPHIC or (_MODEL not in keys and _DEGREES in keys and not projected):
-        return LengthUnit(degrees=True)
+        return LengthUnit(up=_length(keys, _UP, _UP_UNIT)[0] or 1.0, degrees=True)
     across, unknown = _length(keys, _ACROSS, _ACROSS_UNIT)
     up, unknown_up = _length(keys, _UP, _UP_UNIT)
     metres = across or 1.0

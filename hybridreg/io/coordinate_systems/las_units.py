@@ -43,7 +43,8 @@ def metres_of_system(points: Array, unit: LengthUnit, name: str, project: str = 
         x and y are longitude and latitude.
     """
     if unit.degrees and len(points):
-        _check_degrees(points, name, project)
+        _check_degrees(points, name, project + _of_heights(unit.up))
+        return points
     if unit.unknown:
         _warn(
             f"{name}: its coordinate system, {unit.unknown}, gives no unit that is known here; what it does not give "
@@ -69,6 +70,15 @@ def told(records: Iterable[Any]) -> LengthUnit:
             if unit != LengthUnit():  # the keys may be empty, and another record tell
                 return unit
     return LengthUnit()
+
+
+def _of_heights(metres: float) -> str:
+    if metres == 1.0:
+        return ""
+    return (
+        f"; its heights are in units of {metres:.9g} m, and stay so where x and y alone are projected: multiply them "
+        "by it"
+    )
 
 
 def _check_degrees(points: Array, name: str, project: str) -> None:

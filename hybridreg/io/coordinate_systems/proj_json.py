@@ -31,9 +31,9 @@ def unit_of_system(system: Any) -> LengthUnit:
     across, *others = parts if isinstance(parts, list) and parts else [system]
     across = _inner(across)
     axes = _axes(across)
-    if _subtype(across) == "ellipsoidal":
-        return LengthUnit(degrees=True)
     upright = axes[2:] or [unit for each in others for unit in _axes(_inner(each))]
+    if _subtype(across) == "ellipsoidal":
+        return LengthUnit(up=(upright and upright[0]) or 1.0, degrees=True)
     unknown = "" if axes and None not in (axes[0], *upright[:1]) else shorten(str(system.get("name")))
     metres = axes[0] if axes and axes[0] else 1.0
     up = upright[0] if upright and upright[0] else metres

@@ -61,7 +61,7 @@ def unit_of_text(text: str) -> LengthUnit:
     across = next((node for node in nodes if node.keyword in (*_FLAT, *_GEODETIC, *_DEGREES)), None)
     upright = next((node for node in nodes if node.keyword in _UPRIGHT), None)
     if across is not None and _in_degrees(across):
-        return LengthUnit(degrees=True)
+        return LengthUnit(up=next(iter(_lengths(upright) if upright else []), 1.0), degrees=True)
     lengths = _lengths(across) if across else []
     heights = _lengths(upright) if upright else lengths[2:]
     unknown = _told(across or upright, text) if not lengths or (upright and not heights) else ""

@@ -16,6 +16,7 @@ from hybridreg.io.formats.text_names import axes_in_comments, is_missing, is_num
 from hybridreg.io.formats.text_rows import parse_rows, text_lines, without_counts
 from hybridreg.io.meaning.beside_points import changes_points, with_what_is_beside
 from hybridreg.io.meaning.first_column import check_first_column, looked_at, refuse_row_numbers
+from hybridreg.io.meaning.homogeneous import refuse_homogeneous
 from hybridreg.io.meaning.image_shapes import refuse_image
 from hybridreg.io.meaning.spherical import tell_spherical
 from hybridreg.io.meaning.unit_comments import as_commented
@@ -103,7 +104,9 @@ def _check_first(points: NDArray[np.float64], rows: list[str], delimiter: str | 
     refuse_row_numbers(points[:, 0], name, cure)
     some = [rows[k].split(delimiter)[:width] for k in looked_at(len(rows))]
     whole = [row for row in some if len(row) == width and all(map(is_number, row))]
-    check_first_column(np.array(whole, dtype=np.float64).reshape(-1, width), name, cure)
+    table = np.array(whole, dtype=np.float64).reshape(-1, width)
+    refuse_homogeneous(table, name, "x, y and z by w in each row")
+    check_first_column(table, name, cure)
 
 
 def _typical(rows: list[str]) -> str:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybridreg.io.faults import fault
+from hybridreg.io.meaning.repeated_clock import rises_again
 
 Array = NDArray[np.float64]
 
@@ -50,7 +51,7 @@ def check_first_column(rows: NDArray[Any], name: str, cure: str) -> None:
             UserWarning,
             stacklevel=3,
         )
-    elif found := _doubt(some):
+    elif found := _doubt(some) or _repeated(rows):
         warnings.warn(
             f"{name}: its first column was read as x, and {found}; if it is no coordinate, {cure}",
             UserWarning,
@@ -114,6 +115,12 @@ def _doubt(some: Array) -> str:
     if np.median(np.abs(first)) > _EPOCH and np.median(np.abs(some[:, 1:3])) < _SAME * _EPOCH:
         return f"holds numbers of {np.median(first):.2g}, like a time"
     return "rises from row to row, like a time or a number of the row" if _is_clock(some) else ""
+
+
+def _repeated(rows: NDArray[Any]) -> str:
+    if not rises_again(rows, looked_at(len(rows))):
+        return ""
+    return "rises evenly again and again, like a time in each of several sweeps"
 
 
 def _whole(values: Array) -> bool:

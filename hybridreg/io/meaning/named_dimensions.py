@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from hybridreg.io.faults import fault, shorten
+from hybridreg.io.meaning.grids import rows_of
 
 
 def orders(columns: Sequence[Any], table: Any, name: str) -> list[tuple[int, ...] | None]:
@@ -35,9 +36,9 @@ def orders(columns: Sequence[Any], table: Any, name: str) -> list[tuple[int, ...
 
 def _as_rows(column: Any, table: Any) -> str:
     if hasattr(table, "data_vars"):
-        return "x.to_dataframe().reset_index()"
+        return rows_of(table, "")
     if hasattr(column, "to_dataframe"):  # of one array with its coordinates
-        return 'x.to_dataframe("value").reset_index()'
+        return rows_of(table if hasattr(table, "to_dataframe") else column, "value")
     return "xarray.open_dataset(path).to_dataframe().reset_index()"
 
 

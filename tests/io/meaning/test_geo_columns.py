@@ -12,6 +12,8 @@ import pytest
 
 from hybridreg import PointCloud
 from hybridreg.io.coordinate_systems.geo_columns import coordinates_of
+from hybridreg.io.coordinate_systems.geo_keys import unit_of_keys
+from hybridreg.io.coordinate_systems.las_units import metres_of_system
 from hybridreg.io.coordinate_systems.length_unit import LengthUnit
 from hybridreg.io.coordinate_systems.proj_json import unit_of_system
 
@@ -108,3 +110,34 @@ def test_the_python_that_a_message_gives() -> None:
     assert coordinates_of("x", LengthUnit()) == "x.get_coordinates(include_z=True)"
     assert coordinates_of("x", LengthUnit(0.3048, 1.0)).endswith("(include_z=True) * [0.3048, 0.3048, 1.0]")
     assert coordinates_of("x", LengthUnit(degrees=True)).startswith("x.to_crs(x.estimate_utm_crs()).get_")
+    # Projected heights stay as they are, so that feet came out as metres.
+    for unit in (LengthUnit(degrees=True, up=0.3048), LengthUnit(up=0.3048, stretched=True)):
+        call = coordinates_of("x", unit)
+        assert call.endswith(".estimate_utm_crs()).get_coordinates(include_z=True) * [1.0, 1.0, 0.3048]")
+
+
+def test_heights_in_feet_beside_degrees_are_told() -> None:
+    degrees = AT + P * [1e-4, 1e-4, 1.0]
+    with pytest.raises(ValueError, match=r"in degrees; project .*; its heights are in units of 0\.3048 m"):
+        metres_of_system(degrees, LengthUnit(degrees=True, up=0.3048), "target")
+    with pytest.raises(ValueError, match=r"in degrees; project [^;]*$"):
+        metres_of_system(degrees, LengthUnit(degrees=True), "target")
+
+
+def test_systems_in_degrees_say_the_unit_of_their_heights() -> None:
+    feet = LengthUnit(up=FOOT, degrees=True)
+    foot = {"type": "LinearUnit", "name": "US survey foot", "conversion_factor": FOOT}
+    axis = {"name": "Gravity-related height", "abbreviation": "H", "direction": "up", "unit": foot}
+    heights = {
+        "type": "VerticalCRS",
+        "name": "up",
+        "coordinate_system": {"subtype": "vertical", "axis": [axis]},
+    }
+    assert unit_of_system({"type": "CompoundCRS", "name": "two", "components": [DEGREES, heights]}) == feet
+    text = 'COMPD_CS["two",GEOGCS["a",UNIT["degree",0.0174532925199433]],VERT_CS["b",UNIT["foot",0.3048]]]'
+    assert unit_of_system(text) == LengthUnit(up=0.3048, degrees=True)
+    assert unit_of_keys({1024: 2, 2048: 4269, 4099: 9003}).up == pytest.approx(FOOT)
+    assert unit_of_keys({1024: 2, 2048: 4269, 4096: 6360}).up == pytest.approx(FOOT)
+    assert unit_of_keys({1024: 2, 2048: 4269, 4096: 5703}) == LengthUnit(degrees=True)
+    with pytest.warns(UserWarning, match="they were taken for metres"):
+        np.testing.assert_array_equal(metres_of_system(P * 1e4, feet, "target"), P * 1e4)
