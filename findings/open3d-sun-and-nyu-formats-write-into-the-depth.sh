@@ -4,7 +4,7 @@
 # NYU become nothing, then 0.32 m. The three other kinds (TUM, Redwood, colour and depth) leave their input as it is. Nothing is
 # said, and a cloud of the second call is of one piece: all of it is eight times as near.
 #
-# Guess before it was run: the same call on the same image gives the same depths.
+# Guess before it was run: the same call on the same image gives the same depths (noted after a first odd output).
 # For whom it matters: whoever makes two images of one depth, as with grey values for odometry and with colours for a model
 # (`convert_rgb_to_intensity`), unprojects the depth itself as well, keeps images in memory over epochs, or runs a notebook's cell again.
 set -euo pipefail

@@ -4,7 +4,7 @@
 # apart, have an "RMSE" of 0.00008, and noise that is four times as strong makes it about fourteen times as large. With the
 # method for colours alone it is not a length at all.
 #
-# Guess before it was run: metres, as of `inlier_rmse` in the same library's ICP.
+# Guess before it was run: metres, as of `inlier_rmse` in the same library's ICP (noted after a first run).
 # For whom it matters: whoever accepts a pose by a bound in metres (every pose passes), weighs the edges of a pose graph by it,
 # or compares it with the ICP's or with the noise of the camera.
 set -euo pipefail

@@ -4,7 +4,7 @@
 # every point stays matched with nearly all others. The points of an exact copy, moved by 12 degrees, end a degree off, at any
 # scale, with any number of steps and any tolerance. With `update_scale=True` (the default) the same points are exact to the last bit.
 #
-# Guess before it was run: without the scale there is less to estimate, so that it is at least as exact.
+# Guess before it was run: without the scale there is less to estimate, so that it is at least as exact (noted after a first run).
 # For whom it matters: whoever registers measured clouds, whose size is known, and turns the scale off as one should; whoever
 # compares methods with CPD as the baseline; whoever takes `sigma2` for the noise of the sensor, or stops by it.
 set -euo pipefail

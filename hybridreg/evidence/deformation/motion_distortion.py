@@ -36,8 +36,8 @@ Array = NDArray[np.float64]
 # Directions in which a sweep may begin, and how many of them are fitted, the most promising; by hand.
 _STARTS, _FITTED = np.linspace(0.0, 2.0 * np.pi, 12, endpoint=False), 4
 # Farthest partners, spacings, of the points whose distances it must explain, and the share of these from which it is
-# fitted: by hand. Of some 50 right poses, real and of `sim:val`, most explain less; of those distorted so that the pose
-# is off, none.
+# fitted: by hand. Of some 50 right poses, real and of `sim:val`, most explain less; of those whose source was distorted
+# so that the pose is off, hardly any.
 _REACH, _EXPLAINED = 3.0, 0.08
 # Nats per point that it must gain: by hand. Of 18 real pairs and 32 of `sim:val` two gain more than 0.08, both taken by
 # sensors that moved; a turn by three degrees gains 0.25 and more, where the sensor looks around.
