@@ -18,7 +18,7 @@ def test_a_hundred_steps_overfit_four_pairs() -> None:
     pairs = four_pairs(network.config, points=400, extent=8.0)
     generator = torch.Generator().manual_seed(0)
     targets = [compute_targets(p.batch.pyramid, p.transform, network.config, generator) for p in pairs]
-    optimizer = torch.optim.Adam(network.parameters(), 1e-2)
+    optimizer = torch.optim.Adam(network.parameters(), 5e-3)  # at 1e-2 the last digits decide
     rounds: list[list[CofinetLosses]] = []
     for _ in range(25):
         rounds.append([])
