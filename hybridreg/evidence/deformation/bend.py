@@ -75,7 +75,7 @@ def _parts(onto: Onto, T: Array) -> list[Tolerance]:
     ends = np.quantile(points @ along, np.linspace(0.0, 1.0, _PARTS + 1))
     part, part_of_fine = (np.searchsorted(ends[1:-1], each @ along) for each in (points, onto.fine.asked))
     found = (_laid(onto, T, points[part == k], onto.fine.asked[part_of_fine == k]) for k in range(_PARTS))
-    return [one for one in found if one is not None]
+    return [one for one in found if one is not None and one.degrees < _FARTHEST]
 
 
 def _longest(view: View, points: Array) -> Array:

@@ -56,11 +56,11 @@ class MotionDistortion(NamedTuple):
     ----------
     side : "source" or "target"
     degrees, metres : float
-        By which it turned about the vertical, and moved on the level, from the sweep's begin to its end.
+        By which it turned about the vertical, and moved on the level, from the start of the sweep to its end.
     gain : float
         Nats per point by which the cloud lies closer to the other's surfaces than under any rigid pose near by.
     beyond : bool
-        Whether the pose is off by more than the tolerance: at the middle of the sweep, or at its begin and end, since
+        Whether the pose is off by more than the tolerance: at the middle of the sweep, or at its start and end, since
         nobody knows which moment it is for.
     """
 
