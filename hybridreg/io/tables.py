@@ -33,9 +33,8 @@ _UNNAMED = re.compile(r"(column_?|f|v|_)?\d+", re.IGNORECASE)
 
 def labels(x: Any) -> list[Any] | None:
     """Names of a table's columns; None for anything that is not a table."""
-    if hasattr(
-        x, "data_vars"
-    ):  # xarray's Dataset, a mapping of its variables alone: x may be one of its coordinates
+    # xarray's Dataset, a mapping of its variables alone: x may be one of its coordinates.
+    if hasattr(x, "data_vars"):
         variables = list(x.data_vars)
         full = {"x", "y", "z"} <= {str(each).lower() for each in variables}
         return variables if full else [*variables, *x.coords]

@@ -95,10 +95,10 @@ def _laid(onto: Onto, T: Array, points: Array, fine: Array) -> Tolerance | None:
     reaches = surfaces.far * np.array(_CLOSELY)
     closely = descend(roughly, fine, surfaces, [(r, max(surfaces.noise, TRUST * r)) for r in reaches])
     standing = fine if moved.ground is None else fine[np.abs(moved.ground.above(fine)) > spacing]
-    lots = [lot for lot in (fine, standing) if len(lot) >= FEWEST]
+    lots = [(lot, one_way(lot, surfaces, T)) for lot in (fine, standing) if len(lot) >= FEWEST]
 
     def gain(to: Array) -> float:
-        return max(one_way(lot, surfaces, to) - one_way(lot, surfaces, T) for lot in lots)
+        return max(one_way(lot, surfaces, to) - as_it_is for lot, as_it_is in lots)
 
     better = max((roughly, closely), key=gain)
     if gain(better) < _GAIN:

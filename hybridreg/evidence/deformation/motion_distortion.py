@@ -92,9 +92,11 @@ def _moved(views: Views, onto: Onto, side: Side, T: Array) -> MotionDistortion |
     fitted = [(field, fit(onto, T, field=field)) for field in _promising(onto, T)]
     if not fitted:
         return None
-    field, found = max(fitted, key=lambda one: closeness_of(onto, one[1], one[0]))
+    closes = [closeness_of(onto, found, field) for field, found in fitted]
+    close = max(closes)
+    field, found = fitted[closes.index(close)]
     turn, metres = float(abs(found.amounts[0])), float(np.linalg.norm(found.amounts[1:]))
-    gain = closeness_of(onto, found, field) - rigidly(onto, T)
+    gain = close - rigidly(onto, T)
     if gain < _GAIN or turn > _MOST_RAD or metres > _MOST_METRES or _share_near(onto, found, field) < _NEAR:
         return None
     pair = views.scene.pair
