@@ -2,7 +2,7 @@
 # ros2-numpy 0.0.5, as the Python index has it, reads a PointCloud2 by its own idea of one: x, y and z are the first twelve
 # bytes of each point, whatever the fields' offsets and types say, and `rgb` and `intensity` begin at the byte whose number
 # is the field's place in the list: the fourth field at byte 3, inside x. Intensities are read as two bytes of those, colours as
-# three. Nothing is raised. The package of the same name in ROS reads the fields as they are.
+# three. Nothing is raised.
 #
 # Guess before it was run: each field at its offset, in its type, as the message says.
 # For whom it matters: whoever installs it where there is no ROS to install it from, and colours, filters or weighs points by intensity;

@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
 # The format SPZ of Gaussian splats keeps a coordinate in 24 bits, 12 of them behind the point as its writers have it: it ends
-# at 2048 m. gaussforge 0.6.0, which holds the format's own code, folds what lies beyond back into that range, so that a
-# map in UTM comes out within two kilometres of the origin, each axis folded by itself; gsply 0.4.6's `write_spz` puts it all
-# on the edge. Neither says a word, nor does either raise. Within the range a coordinate comes back to an eighth of a millimetre.
+# at 2048 m. gaussforge 0.6.0 folds what lies beyond back into that range, so that a map in UTM comes out within two kilometres
+# of the origin, each axis folded by itself; gsply 0.4.6's `write_spz` puts it all on the edge. Neither says a word, nor does
+# either raise. Within the range a coordinate comes back to an eighth of a millimetre.
 #
 # Guess before it was run: an error, or a coarser step for a larger scene, as the header has a field for the step.
 # For whom it matters: whoever packs georeferenced splats or a point cloud as splats for a viewer and takes points out again.
