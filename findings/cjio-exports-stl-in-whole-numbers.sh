@@ -4,7 +4,7 @@
 # millimetre and stands at the origin. Two files of neighbouring tiles, each with an origin of its own, come out on top
 # of each other. Nothing tells so; STL has no unit that could. The normals of all faces are (0, 0, 0).
 #
-# Guess before it was run: the same corners in all three, as `export` is described.
+# Guess before it was run: the same full coordinates in all three.
 # For whom it matters: whoever registers a scan to a city model by way of STL, which many mesh tools ask for. Export OBJ (three
 # decimals), or multiply the STL's corners by `transform.scale` and add `transform.translate` of the CityJSON file.
 set -euo pipefail

@@ -4,7 +4,7 @@
 # same place, and the whole numbers in it cannot be undone without knowing what the scale was. It says that it saved the
 # file. With `--digit` the same happens from seven digits on, the number in its own help; six are 11 cm.
 #
-# Guess before it was run: the model in degrees, as `crs_reproject --help` shows it.
+# Guess before it was run: the model in degrees, as `crs_reproject --help` shows it (noted after a first output).
 # For whom it matters: whoever brings a city model to another system before a scan is registered to it. Reproject from one
 # system in metres to another, which stays exact, or multiply the vertices out first and reproject them with pyproj.
 set -euo pipefail

@@ -4,7 +4,7 @@
 # blocks of one packet, 0.35 ms of firing, come out 350 s apart, and the stamps of a turn go to and fro by minutes. The
 # places of the points are right, and nothing warns.
 #
-# Guess before it was run: stamps that rise by microseconds within a packet, and by a tenth of a second over a turn.
+# Guess before it was run: stamps within 0.4 ms in a packet, and a tenth of a second over a turn (noted after the code was read).
 # For whom it matters: whoever undoes the motion in these scans, or looks poses up by the points' times: all that is interpolated is
 # wrong, or clamped to the ends of the trajectory. Set `decoder.block_offset_single` and `block_offset_dual` to a millionth.
 set -euo pipefail

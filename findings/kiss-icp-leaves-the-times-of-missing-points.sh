@@ -4,7 +4,7 @@
 # first so many times in their order. A scan with as many missing returns as returns, sky as a rule, is undistorted as if
 # it had been over in half the time: at 20 m/s its last points are moved a metre too far. genz-icp 0.3.2 does the same.
 #
-# Guess before it was run: points and times of one length, as its description has them: (N, 3) and (N,).
+# Guess before it was run: points and times of one length, as its description has them (noted after the code was read).
 # For whom it matters: whoever runs it on clouds of organised drivers, which write NaN for no return (`is_dense` false), and lays the
 # scans beside others. Leave NaN points out of the messages first, or call the loader's `read_points` and mask both.
 set -euo pipefail

@@ -4,7 +4,7 @@
 # whose offset is zero, points of UTM that were kept in millimetres come to lie within a few hundred metres of the origin, and
 # are ten times as far apart. Nothing tells so. Its writer, given the same header and points, converts them.
 #
-# Guess before it was run: the coordinates stay, as with `write_points`, or a header on another grid is refused.
+# Guess before it was run: the coordinates stay, as with `write_points`, or a header on another grid is refused (noted after a first run).
 # For whom it matters: whoever makes a file of chosen points with a header of its own, for another version, point format or system,
 # and registers to it: the pose takes up the offset, and nothing fits by the scale. Give the header the `scales` and
 # `offsets` of the points first, assign `xyz`, or use `laspy.convert`.

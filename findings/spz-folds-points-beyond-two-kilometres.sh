@@ -4,7 +4,7 @@
 # of the origin, each axis folded by itself; gsply 0.4.6's `write_spz` puts it all on the edge. Neither says a word, nor does
 # either raise. Within the range a coordinate comes back to an eighth of a millimetre.
 #
-# Guess before it was run: an error, or a coarser step for a larger scene, as the header has a field for the step.
+# Guess before it was run: places to a 4096th of a metre, and an error for those too far away.
 # For whom it matters: whoever packs georeferenced splats or a point cloud as splats for a viewer and takes points out again.
 # Subtract a local origin first, and keep it beside the file: SPZ has no place for it.
 set -euo pipefail

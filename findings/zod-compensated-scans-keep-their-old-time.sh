@@ -5,7 +5,8 @@
 # that is brought to another moment and back does not come back. At 20 m/s, by 0.3 s and then 0.2 s, it is 6 m off.
 # `extend` then gives several scans a mean time in which the first one counts too much.
 #
-# Guess before it was run: the scan that is given back has the time that it was moved to.
+# Guess before it was run: `extend` gives the mean time, weighted by the points; of the compensation: the scan that is given back has
+# the time that it was moved to (noted after the code was read).
 # For whom it matters: whoever brings what `get_aggregated_lidar(timestamp=...)` or one call gave to the moment of another
 # sensor before the two are registered. Set `core_timestamp` and `timestamps` of the result to the target by hand.
 set -euo pipefail
