@@ -5,7 +5,7 @@
 # here by 3 degrees where the path climbs at 30, by 8 at 45 and by 17 at 60, and `to_mat` gives a matrix that shrinks
 # what it turns.
 #
-# Guess before it was run: rotations whose x axis is the direction of motion, uphill as well.
+# Guess before it was run: rotations whose x axis is the direction of motion, uphill as well (noted after the code was read).
 # For whom it matters: whoever gives GNSS tracks or total station prisms their orientations with it, to compare an odometry's
 # or to lay scans out: drones, stairs and ramps. Normalise the sideways axis: numpy and scipy's `Rotation` do in two lines.
 set -euo pipefail

@@ -3,7 +3,7 @@
 # of them, and every third row is a copy of another. The times of the points, which its lidar clouds have beside the points,
 # stay all as they were, in their order, so that the rows of the two no longer belong together.
 #
-# Guess before it was run: `subsample(1.0)` keeps every point once, and the times follow.
+# Guess before it was run: `subsample(1.0)` keeps every point once, and the times follow (noted after the code was read).
 # For whom it matters: whoever thins scans with it before a registration, a training or an undistortion: copies count twice in
 # every mean and have the distance 0 to a neighbour, and times belong to other points. Choose rows by `numpy.random.Generator.choice`
 # with `replace=False`, and take `points[:, rows]` and `timestamps[:, rows]`.
