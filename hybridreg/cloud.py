@@ -114,7 +114,7 @@ class PointCloud:
         drop = nonfinite == "drop" or recorded.holed or ros_messages.is_cloud(x)
         kept, rows = gate.finite(raw, name, drop=drop)
         kept, rows = gate.returned(kept, rows, name, drop=drop)
-        gate.rounded(kept, name)
+        gate.rounded(kept if recorded.corners is None else recorded.corners, name)
         said = given(viewpoint, len(raw), name)
         if recorded.places is not None and isinstance(viewpoint, str) and viewpoint == "auto":
             words = "as its file says" if len(recorded.places) else "a surface, which no sensor saw"

@@ -15,7 +15,7 @@ import numpy as np
 
 from hybridreg import gate, registry
 from hybridreg.geometry import units
-from hybridreg.geometry.extent import share_within
+from hybridreg.geometry.extent import lone, share_within
 from hybridreg.pair import Pair
 from hybridreg.scene import Scene
 from hybridreg.slots import SLOTS
@@ -170,9 +170,10 @@ def check_scene(scene: Scene, given: Pair) -> None:
         axis = int(np.argmax(extent))
         cells = extent[axis] / level.spacing
         if cells > _MANY_CELLS:
+            far = lone(cloud.points)
             _warn(
                 f"{name}: {cells:.3g} voxels of {level.spacing:.3g} m along {'xyz'[axis]}; "
-                "are the coordinates in metres?"
+                + (f"{far}, remove them" if far else "are the coordinates in metres?")
             )
         elif len(level) < min(_FEW_LEFT, 0.5 * len(cloud)):
             _warn(

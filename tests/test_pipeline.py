@@ -335,6 +335,17 @@ def test_a_degenerate_voxel_count_is_a_warning_with_numbers(courtyard: tuple[hr.
         identity(voxel=1e-3)(pair.source.points * 100, pair.target.points * 100)
 
 
+def test_a_stray_return_far_away_is_named_and_not_the_unit(courtyard: tuple[hr.Pair, np.ndarray]) -> None:
+    pair = courtyard[0]
+    source = pair.source.points.copy()
+    source[7] = [1e5, 0.0, 0.0]
+    with pytest.warns(
+        UserWarning, match=rf"source: .* along x; 1 of {len(source)} points lie up to 1e\+05 m from the"
+    ) as seen:
+        identity(voxel=0.5)(source, pair.target.points)
+    assert not any("in metres" in str(each.message) for each in seen)
+
+
 def test_save_and_load(tmp_path: Path) -> None:
     pipe = hr.Pipeline(voxel=0.3, refine=hr.Gicp(max_distances=(2.0, 1.0), iterations=7))
     pipe.save(tmp_path / "mine.toml")

@@ -13,6 +13,8 @@ Array = NDArray[np.float64]
 
 # Quantile of the points' distances from the cloud's middle that is its extent: stray returns lie anywhere.
 _MOST = 0.9
+# Times the extent beyond which a point lies alone; by hand.
+_LONE = 1e3
 # Points that give a median to a few percent.
 _ASKED = 500
 # Points that give quantiles of a cloud to a thousandth.
@@ -64,3 +66,11 @@ def share_within(radii: Array, share: float) -> float:
 def reach(radii: Array) -> float:
     """Extent of a cloud, metres, from its `radii`."""
     return share_within(radii, _MOST)
+
+
+def lone(points: Array) -> str:
+    """In words, how many of `points` (N, 3) lie a thousand times as far away as the extent; nothing where none does."""
+    middle = np.median(points, axis=0)
+    away = np.sqrt(sum((points[:, k] - middle[k]) ** 2 for k in range(3)))
+    count = int((away > _LONE * np.quantile(away, _MOST)).sum())
+    return f"{count} of {len(points)} points lie up to {away.max():.3g} m from the others" if count else ""

@@ -9,6 +9,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from hybridreg.geometry.extent import lone
+
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
@@ -62,10 +64,10 @@ def voxel_cells(points: Array, voxel: float) -> Cells:
     origin = low - 1e-5 * voxel
     shape = np.floor((high - origin) / voxel) + 1.0
     if math.prod(shape.tolist()) > _MOST_CELLS:
-        raise ValueError(
-            f"a voxel of {voxel:.3g} m cuts the cloud into {' x '.join(f'{s:.3g}' for s in shape)} cells; "
-            "choose a larger voxel or check the unit"
-        )
+        far = lone(points)
+        cure = f"{far}, remove them" if far else "choose a larger voxel or check the unit"
+        cells = " x ".join(f"{s:.3g}" for s in shape)
+        raise ValueError(f"a voxel of {voxel:.3g} m cuts the cloud into {cells} cells; {cure}")
     nx, ny, nz = (int(s) for s in shape)
     lots: list[_Lot] = []
     most = _KEPT

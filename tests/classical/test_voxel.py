@@ -165,3 +165,13 @@ def test_derived_voxel_of_a_cloud_that_is_nearly_one_place() -> None:
     points[:3] = np.eye(3)
     pair = Pair.of(points, points + np.eye(3)[0])
     assert default_voxel(pair.source, pair.target) > 0
+
+
+@pytest.mark.parametrize("lone", [1, 3])
+def test_points_far_from_all_others_are_named_where_they_make_too_many_cells(lone: int) -> None:
+    # As laspy 2.7.0 stores NaN in millimetres; a larger voxel was advised, at which the others become one cell.
+    points = np.random.default_rng(0).uniform(-20.0, 20.0, (1000, 3))
+    points[:lone] = -(2**31) * 0.001
+    with pytest.raises(ValueError, match=rf"{lone} of 1000 points lie up to 3.72e\+06 m .*remove them"):
+        voxel_centroids(points, 0.3)
+    assert len(voxel_centroids(points[lone:], 0.3)) > 900

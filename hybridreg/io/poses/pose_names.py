@@ -70,7 +70,8 @@ def _refuse_counted(names: Sequence[str], name: str) -> None:
     for each in names:
         if found := _COUNTED.fullmatch(each.strip().lower()):
             counted.setdefault(found.group(1), []).append(int(found.group(2)))
-    if any(numbers in ([0, 1, 2, 3], [1, 2, 3, 4]) for numbers in counted.values()):
+    fours = [numbers for numbers in counted.values() if numbers in ([0, 1, 2, 3], [1, 2, 3, 4])]
+    if len(fours) == 1:  # several are the rows of a matrix, such as `T00 T01 T02 T03 T10` and so on
         problem = f"its columns {shorten(' '.join(names))} do not say which part of the quaternion is w"
         raise fault(name, problem, "call them x y z qx qy qz qw, or x y z qw qx qy qz, in their order")
 

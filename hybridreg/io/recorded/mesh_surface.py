@@ -19,6 +19,7 @@ Array = NDArray[np.float64]
 
 # Points of a mesh: some hundreds on each of the cells that a default voxel leaves of it.
 _SAMPLES = 200_000
+_LOOKED_AT = 2_000  # faces whose corners are passed on
 _VERTEX = re.compile(rb"^v[ \t]", re.MULTILINE)
 _HEAD, _STL = 16_384, 80  # bytes looked at for comments, and those of a binary STL's title
 NO_PLACE = np.zeros((0, 3))
@@ -57,7 +58,10 @@ def read_mesh(path: Path, selection: Selection) -> Recorded:
     if meshes:
         every = max(sum(held), _vertices_of_obj(path))
         refuse_loose(sum(clouds) or every - sum(used), 0 if clouds else every, name)
-        return Recorded(as_commented(spread_over(triangles, name), _comments(path), name), NO_PLACE)
+        some = triangles[:: max(1, len(triangles) // _LOOKED_AT)].reshape(-1, 3)
+        # Together, so that a unit counts for both and is told once.
+        both = as_commented(np.vstack([spread_over(triangles, name), some]), _comments(path), name)
+        return Recorded(both[:_SAMPLES], NO_PLACE, corners=both[_SAMPLES:])
     if not points:
         raise fault(name, "holds neither faces nor points", "export it with its geometry")
     return Recorded(as_commented(np.vstack(points), _comments(path), name))

@@ -147,6 +147,7 @@ class Recorded(NamedTuple):
     of_point : (N,) row of each point's place, where there are several
     holed : whether missing returns are part of the format, so that they are left out without being asked
     guess : (3,) where its sensor may have stood, to be tested like an origin
+    corners : (n, 3) of a surface, over which the points were spread, all or some: they have the digits of the file
     """
 
     points: Array
@@ -154,6 +155,7 @@ class Recorded(NamedTuple):
     of_point: NDArray[np.int64] | None = None
     holed: bool = False
     guess: Array | None = None
+    corners: Array | None = None
 
 
 def check_filled(recorded: Recorded, name: str) -> Recorded:

@@ -44,7 +44,7 @@ def read_vtp(path: Path, selection: Selection) -> Recorded:
     if not len(triangles):
         return Recorded(points)
     refuse_loose(len(points) - corners(triangles, len(points)), len(points), name)
-    return Recorded(spread_over(points[triangles], name), NO_PLACE)
+    return Recorded(spread_over(points[triangles], name), NO_PLACE, corners=points)
 
 
 def _poly_data(name: str) -> Any:

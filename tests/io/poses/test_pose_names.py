@@ -94,6 +94,19 @@ def test_counted_parts_of_a_quaternion_are_refused(tmp_path: Path, names: str) -
     np.testing.assert_allclose(read_pose(path), POSE, rtol=0, atol=1e-14)
 
 
+@pytest.mark.parametrize("mark", ["T{}{}", "m_{}_{}"])
+@pytest.mark.parametrize("rows", [3, 4])
+def test_counted_elements_of_a_matrix_are_no_quaternion(tmp_path: Path, mark: str, rows: int) -> None:
+    # `T00 T01 T02 T03 T10` and so on, as tables of poses have them, was refused for an unknown place of w.
+    names = ",".join(mark.format(row, column) for row in range(rows) for column in range(4))
+    path = tmp_path / "pose.csv"
+    path.write_text(f"{names}\n{','.join(map(repr, POSE[:rows].ravel().tolist()))}\n")
+    np.testing.assert_allclose(read_pose(path), POSE, rtol=0, atol=1e-14)
+    path.write_text(f"poseId,timestamp,{names}\n0,1.5,{','.join(map(repr, POSE[:rows].ravel().tolist()))}\n")
+    with pytest.raises(ValueError, match=rf"holds {4 * rows + 2} numbers; write a pose as four lines"):
+        read_pose(path)
+
+
 def test_a_row_of_any_width_is_answered_at_once(tmp_path: Path) -> None:
     path = tmp_path / "pose.txt"
     path.write_text("# " + "w " * 100_000 + "\n" + "1 " * 100_000 + "\n")
