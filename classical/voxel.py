@@ -17,7 +17,7 @@ from hybridreg.geometry.voxel_cells import voxel_centroids
 from hybridreg.pair import Pair
 from hybridreg.resolution import comparable, default_voxel
 from hybridreg.runtime.side_by_side import side_by_side
-from hybridreg.scene import Level, Scene
+from hybridreg.scene import SIDES, Level, Scene, Side
 from hybridreg.stage import Stage
 from hybridreg.thinning import thinned
 
@@ -74,16 +74,16 @@ class VoxelGrid(Stage):
             return _each_by_itself(pair)
         voxel = self.voxel or default_voxel(pair.source, pair.target)
         reached = voxel
-        points = side_by_side(partial(_cells, voxel), *clouds)
+        points = side_by_side(partial(_cells, voxel, pair), *SIDES)
         at = [voxel, voxel]
         while self.voxel is None and (most := max(map(len, points))) > _MOST_POINTS:
             voxel = _two_digits_up(voxel * (most / _MOST_POINTS) ** 0.5)
-            for k, cloud in enumerate(clouds):
+            for k, side in enumerate(SIDES):
                 if len(points[k]) > _MOST_POINTS:
-                    points[k], at[k] = _cells(voxel, cloud), voxel
-        for k, cloud in enumerate(clouds):  # one of few points follows when the voxel is found
+                    points[k], at[k] = _cells(voxel, pair, side), voxel
+        for k, side in enumerate(SIDES):  # one of few points follows when the voxel is found
             if at[k] != voxel:
-                points[k] = _cells(voxel, cloud)
+                points[k] = _cells(voxel, pair, side)
         spacing = [voxel, voxel]
         if self.density == "match":
             dense = int(np.argmax([len(p) for p in points]))
@@ -106,9 +106,9 @@ class VoxelGrid(Stage):
 def _each_by_itself(pair: Pair) -> Scene:
     # One length for a cloud in millimetres and one in metres would reduce the second to nothing.
     levels = []
-    for cloud in (pair.source, pair.target):
-        voxel = default_voxel(pair.source, pair.target)
-        points = voxel_centroids(cloud.points, voxel)
+    for side in SIDES:
+        cloud, voxel = getattr(pair, side), default_voxel(pair.source, pair.target)
+        points = voxel_centroids(cloud.points, voxel, side)
         while len(points) > _MOST_POINTS:
             voxel = _two_digits_up(voxel * (len(points) / _MOST_POINTS) ** 0.5)
             points = voxel_centroids(cloud.points, voxel)
@@ -121,8 +121,9 @@ def _each_by_itself(pair: Pair) -> Scene:
     return scene
 
 
-def _cells(voxel: float, cloud: PointCloud) -> Array:
-    return cloud.once(("cells", voxel), partial(voxel_centroids, cloud.points, voxel))
+def _cells(voxel: float, pair: Pair, side: Side) -> Array:
+    cloud: PointCloud = getattr(pair, side)
+    return cloud.once(("cells", voxel), partial(voxel_centroids, cloud.points, voxel, side))
 
 
 def _two_digits_up(length: float) -> float:

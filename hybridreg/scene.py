@@ -49,9 +49,10 @@ class Level:
     _kept: dict[Hashable, Any] = field(default_factory=dict, repr=False)
 
     @classmethod
-    def on_cells(cls, cloud: PointCloud, voxel: float) -> Level:
-        """A cloud's level of the centroids of a grid's cells of one edge, metres."""
-        return cls(points=voxel_centroids(cloud.points, voxel), spacing=voxel, viewpoint=cloud.viewpoint)
+    def on_cells(cls, cloud: PointCloud, voxel: float, name: str = "cloud") -> Level:
+        """A cloud's level of the centroids of a grid's cells of one edge, metres; `name` is what an error calls it."""
+        points = voxel_centroids(cloud.points, voxel, name)
+        return cls(points=points, spacing=voxel, viewpoint=cloud.viewpoint)
 
     def __len__(self) -> int:
         return len(self.points)
@@ -125,11 +126,12 @@ class Scene:
     def on_cells(cls, pair: Pair, voxel: float) -> Scene:
         """Both clouds as the centroids of a grid's cells of one edge, metres."""
         clouds = thinned(pair, voxel)
-        source, target = side_by_side(
-            lambda cloud: cloud.once(("level", voxel), partial(Level.on_cells, cloud, voxel)),
-            clouds.source,
-            clouds.target,
-        )
+
+        def level(side: Side) -> Level:
+            cloud: PointCloud = getattr(clouds, side)
+            return cloud.once(("level", voxel), partial(Level.on_cells, cloud, voxel, side))
+
+        source, target = side_by_side(level, *SIDES)
         return cls(pair=clouds, source=source, target=target)
 
     def at(self, voxel: float) -> Scene:

@@ -538,3 +538,14 @@ def test_a_stage_may_hold_what_no_file_can(tmp_path: Path, held: Any) -> None:
     assert type(held).__name__ in pipe.run(testing.sample_pair()[0]).spec["refine"]["network"]
     with pytest.raises(ValueError, match=r"Holds: network is a .*, which no file holds"):
         pipe.save(tmp_path / "p.toml")
+
+
+@pytest.mark.parametrize("side", ["source", "target"])
+def test_too_many_cells_name_the_cloud(side: str) -> None:
+    points = np.random.default_rng(0).uniform(-20.0, 20.0, (1000, 3))
+    far = np.vstack([points, [3e6, 2e6, 1e6]])
+    clouds = {"source": points, "target": points, side: far}
+    with pytest.raises(
+        ValueError, match=rf"^{side}: a voxel of .* cells; 1 of 1001 points lie up to 3.74e\+06 m"
+    ):
+        hr.register(**clouds, preset="icp")

@@ -39,7 +39,7 @@ class _Lot(NamedTuple):
     first: Integers  # (n,) row of the first of them
 
 
-def voxel_centroids(points: Array, voxel: float) -> Array:
+def voxel_centroids(points: Array, voxel: float, name: str = "cloud") -> Array:
     """Centroids (n, 3) of the occupied cells of a grid, ordered by cell.
 
     Parameters
@@ -47,16 +47,18 @@ def voxel_centroids(points: Array, voxel: float) -> Array:
     points : (N, 3)
     voxel : float
         Edge of a cell, metres.
+    name : str
+        What an error calls the points.
 
     Raises
     ------
     ValueError
         If the grid has more cells than an index can represent.
     """
-    return voxel_cells(points, voxel).centroids
+    return voxel_cells(points, voxel, name).centroids
 
 
-def voxel_cells(points: Array, voxel: float) -> Cells:
+def voxel_cells(points: Array, voxel: float, name: str = "cloud") -> Cells:
     """The occupied cells of a grid with edges of `voxel` metres; as `voxel_centroids`."""
     # The origin lies slightly below the smallest coordinate: data rounded to millimetres would otherwise lie on cell
     # borders, where the last digit of a float decides.
@@ -67,7 +69,7 @@ def voxel_cells(points: Array, voxel: float) -> Cells:
         far = lone(points)
         cure = f"{far}, remove them" if far else "choose a larger voxel or check the unit"
         cells = " x ".join(f"{s:.3g}" for s in shape)
-        raise ValueError(f"a voxel of {voxel:.3g} m cuts the cloud into {cells} cells; {cure}")
+        raise ValueError(f"{name}: a voxel of {voxel:.3g} m cuts it into {cells} cells; {cure}")
     nx, ny, nz = (int(s) for s in shape)
     lots: list[_Lot] = []
     most = _KEPT
