@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# OpenCV 4.14.0's `calibrateHandEye` returns a rotation and a translation, and nothing that says how well they are known. Of a vehicle, which
+# OpenCV 4.14.0's `calibrateHandEye` returns a rotation and a translation, and nothing on how well they are known. Of a vehicle, which
 # turns about one axis but for half a degree, with rotations measured to a tenth of a degree and 2 cm, its five methods put the sensor
 # 0.3 to 40 m above or below where it is; those by Park and Horaud turn it by four degrees too. Where it turns about one axis alone the
 # translation along it is unknown: the method by Horaud gives a rotation 90 degrees off, and the one by Daniilidis the right one 2 km
