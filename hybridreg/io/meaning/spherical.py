@@ -23,7 +23,10 @@ _ANGLE = re.compile(
     rf"(?:horizontal|vertical)[ _]angle|angle){_AFFIX}"
 )
 # As `aer2enu` of pymap3d 3.2.0 has it: by the other formulas the cloud is its mirror image.
-_CLOCKWISE = "where the azimuth counts clockwise, as of compasses, Velodyne's sensors and radars, the first two change places"
+_CLOCKWISE = (
+    "where the azimuth counts clockwise, as of compasses, Velodyne's sensors and radars, "
+    "the first two change places"
+)
 _CURE = (
     "convert them to x, y and z: range cos(elevation) cos(azimuth), range cos(elevation) sin(azimuth), "
     f"range sin(elevation); {_CLOCKWISE}; an elevation is 90 degrees less the angle from the zenith"
