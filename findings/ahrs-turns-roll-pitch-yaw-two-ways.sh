@@ -4,7 +4,7 @@
 # examples). `DCM.to_rpy` gives back neither: of a matrix that was made of three angles it returns others, and of a yaw of 30 degrees
 # alone a roll of -30. `DCM.log` has the opposite sign of the vector that turns so, as its formula is documented.
 #
-# Guess before it was run: one rotation, that of scipy's "xyz", and `to_rpy` returns what went in.
+# Guess before it was run: one rotation, that of scipy's "xyz" (that `to_rpy` returns what went in was noted after a first odd output).
 # For whom it matters: whoever levels scans by an IMU's angles, or turns a pose into angles and back: heading and roll change places,
 # and where all angles are small, as on a road, the result looks like a poor calibration. Build the matrix by the
 # quaternion's `to_DCM`.

@@ -4,7 +4,8 @@
 # a neighbour that is not the nearest, up to 3 m farther off where the points are decimetres apart. A wider search (`ef`, `efSearch`)
 # finds hardly more. Without the equal points both find every neighbour.
 #
-# Guess before it was run: a few neighbours are missed, as the method is approximate, and a wider search finds them.
+# Guess before it was run: a few neighbours are missed, as the method is approximate, and a wider search finds them (noted after a
+# first odd output of hnswlib).
 # For whom it matters: whoever matches scans by such an index. Organised scans have all missing returns at the origin. Leave
 # repeated rows out, or take a tree, which is exact.
 set -euo pipefail

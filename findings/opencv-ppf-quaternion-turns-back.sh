@@ -4,7 +4,7 @@
 # matrix of its inverse too, so that the class agrees with itself and with nothing else. The angle beside them and the translation
 # are the same either way.
 #
-# Guess before it was run: `q` turns as the matrix beside it does.
+# Guess before it was run: `q` turns as the matrix beside it does (noted after a first odd output).
 # For whom it matters: whoever passes found poses on as a position and a quaternion, to ROS or to a robot, or sets a start by one: turns
 # of a few degrees are wrong by twice as many, about which an ICP says nothing. Make the quaternion of the matrix.
 set -euo pipefail

@@ -4,7 +4,7 @@
 # a pose of 44 degrees by 6.7 more, a tenth too small by 1.3, and two digits by 0.13. The translation stays scaled. What comes out is
 # a rotation to the last digit, so that no check finds it. pycolmap's `Sim3d(matrix)` takes the same matrix apart rightly.
 #
-# Guess before it was run: an exception, or the rotation with its scale taken out.
+# Guess before it was run: an exception, or the rotation with its scale taken out (noted after a first odd output).
 # For whom it matters: whoever brings a reconstruction into a scan's frame by a similarity, or reads matrices with few digits: degrees
 # are missing at once, and an ICP begins there. Divide by the cube root of the determinant first, or use an SVD.
 set -euo pipefail

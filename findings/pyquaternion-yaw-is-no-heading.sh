@@ -4,7 +4,7 @@
 # that leans: of one turned by 30 degrees, then tilted down by 20 and rolled by 10, it is 28.5 degrees, and rolled by 60 it is -0.5.
 # scipy's `as_euler("ZYX")` gives the angles of the name. Upright both agree.
 #
-# Guess before it was run: scipy's "ZYX", as for the convention that is named.
+# Guess before it was run: scipy's "ZYX", as for the convention that is named (noted after a first odd output).
 # For whom it matters: whoever takes the heading of a camera or a tilted LiDAR from nuScenes' quaternions, for a start or a box in the
 # bird's eye view, or makes a pose of the three angles by another library. Take `rotation_matrix[:, 0]`, or scipy.
 set -euo pipefail
