@@ -444,6 +444,29 @@ def test_a_pose_of_another_library_in_place_of_its_matrix_is_told(held: str) -> 
         Prior(init=SimpleNamespace(**{held: lambda: TURNED}))
 
 
+def test_the_cures_for_tensors_and_matrices_of_vtk_give_the_pose() -> None:
+    # Open3D 0.20.0's tensor ICP and VTK 9.7.2's vtkTransform: "give its transformation" and "give its matrix" led to
+    # what was refused without a cure.
+    torch = pytest.importorskip("torch")
+    open3d, vtk = pytest.importorskip("open3d"), pytest.importorskip("vtk")
+    transform = vtk.vtkTransform()
+    transform.SetMatrix(TURNED.ravel())
+    for held in (
+        torch.tensor(TURNED, requires_grad=True),
+        torch.eye(4, dtype=torch.bfloat16),
+        open3d.core.Tensor(TURNED),
+        transform.GetMatrix(),
+    ):
+        with pytest.raises(ValueError, match="init: expected numbers .*; give ") as caught:
+            Prior(init=held)
+        cure = str(caught.value).split("; give ")[1]
+        given = eval(cure if "init" in cure else f"init.{cure[4:]}", {"init": held, "numpy": np})
+        expected = np.eye(4) if getattr(held, "dtype", None) is torch.bfloat16 else TURNED
+        np.testing.assert_allclose(Prior(init=given).init, expected, rtol=0, atol=1e-12)
+    with pytest.raises(ValueError, match="give its matrix"):
+        Prior(init=transform)
+
+
 def test_several_poses_in_place_of_one_are_told() -> None:
     # scipy 1.17's RigidTransform of three was to give its as_matrix(), which is three matrices, refused without a cure.
     transforms = pytest.importorskip("scipy.spatial.transform")

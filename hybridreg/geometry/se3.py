@@ -172,6 +172,10 @@ def check(T: Any, name: str = "T", tolerance: float = 1e-4) -> Array:
 
 def _cure_of(T: Any, name: str) -> str:
     """What to do with an object that is no matrix, where it is known."""
+    if _has(T, "numpy") and _has(T, "cpu"):  # a tensor: torch's with a gradient or in bfloat16, Open3D's
+        return f"; give its {'detach().cpu().double()' if _has(T, 'detach') else 'cpu()'}.numpy()"
+    if _has(T, "GetElement"):  # VTK's matrix, as its transforms have one
+        return f"; give numpy.array([[{name}.GetElement(i, j) for j in range(4)] for i in range(4)])"
     held = next((each for each in _HOLD if _has(T, each)), "")
     if held:
         count = None if isinstance(T, dict) else _count(T)  # scipy's RigidTransform may be any number of them

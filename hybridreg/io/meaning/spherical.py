@@ -22,10 +22,16 @@ _ANGLE = re.compile(
     rf"(?:spherical)?(?:azim(?:uth)?s?|azimut|az|elev(?:ation)?s?|el|theta|phi|inclination|zenith|bearing|pan|tilt|hz|"
     rf"(?:horizontal|vertical)[ _]angle|angle){_AFFIX}"
 )
+# As `aer2enu` of pymap3d 3.2.0 has it: by the other formulas the cloud is its mirror image.
+_CLOCKWISE = (
+    "where the azimuth counts clockwise, as of compasses, Velodyne's sensors and radars, "
+    "the first two change places"
+)
 _CURE = (
     "convert them to x, y and z: range cos(elevation) cos(azimuth), range cos(elevation) sin(azimuth), "
-    "range sin(elevation)"
+    f"range sin(elevation); {_CLOCKWISE}; an elevation is 90 degrees less the angle from the zenith"
 )
+_CURE_BESIDE_Z = f"convert them to x, y and z: range cos(azimuth), range sin(azimuth), z; {_CLOCKWISE}"
 _ORDERS = ((0, 1, 2), (1, 2, 0), (1, 0, 2), (2, 1, 0))  # azimuth, elevation, range
 _NEARLY = 0.985  # of a turn
 _MOST_BEAMS = 128
@@ -43,7 +49,7 @@ def refuse_spherical(names: Iterable[str], name: str) -> None:
     parts = [re.split(r"\s*[\[(/]", each.lower())[0] for each in held]
     if any(map(_RANGE.fullmatch, parts)) and any(map(_ANGLE.fullmatch, parts)):
         problem = f"its columns {shorten(', '.join(held), 200)} are angles and ranges, not coordinates"
-        raise fault(name, problem, _CURE)
+        raise fault(name, problem, _CURE_BESIDE_Z if "z" in parts else _CURE)
 
 
 def tell_spherical(rows: NDArray[Any], name: str) -> None:

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -45,6 +46,42 @@ def test_columns_of_angles_are_not_told_to_be_called_x(names: tuple[str, ...]) -
         ) as caught:
             read()
         assert "name the coordinates" not in str(caught.value)
+
+
+def converted(names: tuple[str, ...], **values: np.ndarray) -> np.ndarray:
+    """x, y and z by the formulas of the message, of angles in radians."""
+    with pytest.raises(ValueError, match="convert them to x, y and z: ") as caught:
+        PointCloud.of({each: np.zeros(60) for each in names})
+    formulas = re.search("x, y and z: (.*?); where", str(caught.value)).group(1).split(", ")
+    known = {**values, "cos": np.cos, "sin": np.sin}
+    return np.column_stack([eval(each.replace(" ", " * "), known) for each in formulas])
+
+
+def test_the_cure_gives_the_points_of_either_azimuth() -> None:
+    # As pymap3d 3.2.0's enu2aer has them, clockwise from north: the cure was a mirror image of the place.
+    place = G.normal(0.0, 10.0, (60, 3))
+    flat = np.hypot(place[:, 0], place[:, 1])
+    told = {"range": np.linalg.norm(place, axis=1), "elevation": np.arctan2(place[:, 2], flat)}
+    from_x = np.arctan2(place[:, 1], place[:, 0])
+    from_north = np.arctan2(place[:, 0], place[:, 1])
+    names = ("azimuth", "elevation", "range")
+    counter = converted(names, azimuth=from_x, **told)
+    clockwise = converted(names, azimuth=from_north, **told)[:, [1, 0, 2]]
+    np.testing.assert_allclose(counter, place, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(clockwise, place, rtol=0, atol=1e-12)
+    with pytest.raises(
+        ValueError, match="where the azimuth counts clockwise, .* the first two change places"
+    ):
+        PointCloud.of({each: np.zeros(60) for each in names})
+
+
+@pytest.mark.parametrize("names", [("rho", "phi", "z"), ("z", "range", "azimuth_deg")])
+def test_the_cure_beside_a_height_keeps_it(names: tuple[str, ...]) -> None:
+    # As vector 1.9.0's arrays have them; the cure wanted an elevation that is not there.
+    place = G.normal(0.0, 10.0, (60, 3))
+    flat, angle = np.hypot(place[:, 0], place[:, 1]), np.arctan2(place[:, 1], place[:, 0])
+    found = converted(names, azimuth=angle, range=flat, z=place[:, 2])
+    np.testing.assert_allclose(found, place, rtol=0, atol=1e-12)
 
 
 @pytest.mark.parametrize(
