@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from hybridreg.evidence import information, traffic
 from hybridreg.evidence.agreement import Agreement, compare
-from hybridreg.evidence.deformation import bend, motion_distortion, range_offset, scale, stretch
+from hybridreg.evidence.deformation import bend, heights, motion_distortion, range_offset, scale, stretch
 from hybridreg.evidence.deformation.bend import Bend
 from hybridreg.evidence.deformation.deformed import Deformed, Onto, closeness_of, rigidly
 from hybridreg.evidence.deformation.motion_distortion import MotionDistortion
@@ -67,7 +67,8 @@ class PoseEvidence:
     @cached_property
     def stretch(self) -> Stretch | None:
         """How the source must be stretched to fit better, if it must."""
-        return stretch.stretch(self.views, self.T, self.closeness, self._explained)
+        along = stretch.stretch(self.views, self.T, self.closeness, self._explained)
+        return along or heights.heights(self.views, self.T)
 
     @cached_property
     def motion_distortion(self) -> MotionDistortion | None:

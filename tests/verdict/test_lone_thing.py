@@ -44,6 +44,14 @@ def test_its_back_laid_on_its_front_is_not_ok(posts: int, around_deg: float) -> 
     assert result.verdict != "ok"
 
 
+def test_nor_where_it_fills_most_of_the_view() -> None:
+    pair = scanned(house(), 172.0).scene.pair
+    # Turned until it lies ahead: it fills some 17 degrees to either side, of 23.
+    ahead = (se3.apply(se3.yaw(-192.0), pair.source.points), se3.apply(se3.yaw(-20.0), pair.target.points))
+    result = hr.register(*(cloud[np.abs(np.arctan2(cloud[:, 1], cloud[:, 0])) < 0.4] for cloud in ahead))
+    assert result.verdict != "ok"
+
+
 def test_the_reason_says_so_and_a_start_settles_it() -> None:
     made = scanned(house(), 8.0)
     pair = made.scene.pair
