@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
-# point-cloud-utils 0.34.0's `signed_distance_to_mesh` multiplies the distance by 1 - 2 w, where w is the winding number and
-# no whole number where a mesh is open: 1 m above, or below, the middle of a terrain of 100 m, it gives 2 cm. Of a closed
-# mesh w is a little off outside, and so is the distance, by 0.4 m for a box of 200 m. Inside, and from
-# `closest_points_on_mesh`, distances are right.
+# point-cloud-utils 0.34.0's `signed_distance_to_mesh` shrinks the distance where the mesh is open: 1 m above, or below, the
+# middle of a terrain of 100 m, it gives 2 cm, as if it were multiplied by 1 - 2 |w| of the winding number w, a half there. Outside
+# of a closed mesh it is a little off too, by 0.4 m for a box of 200 m. Inside, and from `closest_points_on_mesh`, distances
+# are right.
 #
 # Guess before it was run: the distance, below 0 inside; of the terrain, noted after the box, nearly 0 above and twice the
 # distance below.
