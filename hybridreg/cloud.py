@@ -85,7 +85,8 @@ class PointCloud:
         nonfinite : "raise" or "drop"
             What to do with points that are not finite; in ROS's messages and bags they are missing returns, and always
             dropped. "drop" also drops points exactly at one place, where they are 1 % of the points or more: drivers
-            write the origin for missing returns, and a pose moves it; "raise" warns of them.
+            write the origin for missing returns, and a pose moves it; and ends of simulated rays that met nothing, at
+            one longest range in all directions. "raise" warns of them.
         viewpoint : "auto", "none", (3,), (N, 3), or ((k, 3), (N,))
             Where the sensor stood, in the coordinates of the points: one place, one for each point, or places and the
             row of each point's. "none" is right for a map, a CAD model or a merged cloud whose viewpoints are unknown:

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from hybridreg.io.meaning.farthest_shell import farthest_shell
 from hybridreg.io.meaning.shared_place import shared_place
 from hybridreg.io.point_objects import points_of
 
@@ -94,8 +95,8 @@ def finite(points: Array, name: str, *, drop: bool) -> tuple[Array, NDArray[np.b
 def returned(
     points: Array, rows: NDArray[np.bool_] | None, name: str, *, drop: bool
 ) -> tuple[Array, NDArray[np.bool_] | None]:
-    """Warn of many points exactly at (0, 0, 0), which drivers write for missing returns, or at another place, and of
-    heights that rasters write for cells without data, or drop them on request.
+    """Warn of many points exactly at (0, 0, 0), which drivers write for missing returns, or at another place, of a
+    sphere of rays that met nothing, and of heights that rasters write for cells without data, or drop them on request.
 
     `rows` (N,) are those that `finite` kept; the result is of the same form.
     """
@@ -103,6 +104,7 @@ def returned(
     points, rows = _away_from(
         np.zeros(3), "which drivers write for missing returns", points, rows, name, drop=drop
     )
+    points, rows = _met(points, rows, name, drop=drop)
     place = shared_place(points)
     if place is None:
         return points, rows
@@ -125,6 +127,24 @@ def _away_from(
     where = ", ".join(f"{each:.6g}" for each in place)
     warnings.warn(
         f"{name}: {n_bad} of {len(points)} points lie exactly at ({where}), {why}; remove them{OR_DROP}",
+        UserWarning,
+        stacklevel=5,
+    )
+    return points, rows
+
+
+def _met(
+    points: Array, rows: NDArray[np.bool_] | None, name: str, *, drop: bool
+) -> tuple[Array, NDArray[np.bool_] | None]:
+    found = farthest_shell(points)
+    if found is None:
+        return points, rows
+    reach, there = found
+    if drop:
+        return points[~there], _kept(rows, ~there)
+    warnings.warn(
+        f"{name}: {int(there.sum())} of {len(points)} points lie {reach:.5g} m from the origin, all others nearer, as "
+        f"the ends of simulated rays do that met nothing; remove them{OR_DROP}",
         UserWarning,
         stacklevel=5,
     )
