@@ -22,8 +22,8 @@ from hybridreg.scene import SIDES, Scene
 
 Array = NDArray[np.float64]
 
-# All by hand. On no real pair of vehicle LiDARs is the first more than 0.8: things stand all around. Of 14 right poses of
-# rooms (hard kinds with even seeds) both hold of one.
+# All by hand. On no real pair of vehicle LiDARs is the first more than 0.8: things stand all around. Of 14 right poses
+# of rooms (hard kinds with even seeds) both hold of one.
 _FAR = 1.3  # the sensor's distance from the middle of the things over their extent, at least
 _NARROW = 0.97  # angle that the things fill over the angle that the ground fills, at most
 _OFF_GROUND = 3.0  # heights over the ground, thicknesses, from which a point belongs to a thing

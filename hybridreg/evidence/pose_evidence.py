@@ -13,7 +13,7 @@ from hybridreg.evidence import information, traffic
 from hybridreg.evidence.agreement import Agreement, compare
 from hybridreg.evidence.deformation import bend, heights, motion_distortion, range_offset, scale, stretch
 from hybridreg.evidence.deformation.bend import Bend
-from hybridreg.evidence.deformation.deformed import Deformed, Onto, closeness_of, rigidly
+from hybridreg.evidence.deformation.deformed import Deformed, Onto, closeness_of
 from hybridreg.evidence.deformation.motion_distortion import MotionDistortion
 from hybridreg.evidence.deformation.range_offset import RangeOffset
 from hybridreg.evidence.deformation.scale import Size
@@ -81,13 +81,13 @@ class PoseEvidence:
         return bend.bend(self.views, self.T)
 
     def _explained(self, fitted: Array) -> bool:
-        # Whether an offset of the ranges, or a sensor's motion, lets the clouds lie as closely as another deformation
-        # (4, 4), affine: nothing is strained then.
-        onto, offset, motion = Onto.target(self.views), self.range_offset, self.motion_distortion
-        strained = closeness_of(onto, Deformed(fitted))
+        # Whether an offset of the ranges, or a sensor's motion, lets the clouds lie more closely than another
+        # deformation (4, 4), affine: nothing is strained then.
+        offset, motion = self.range_offset, self.motion_distortion
+        strained = closeness_of(Onto.target(self.views), Deformed(fitted))
         if offset is not None and offset.close >= strained:
             return True
-        return motion is not None and motion.gain >= strained - rigidly(onto, self.T)
+        return motion is not None and motion.explains(strained)
 
     @cached_property
     def traffic(self) -> Array | None:

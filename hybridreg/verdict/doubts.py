@@ -110,16 +110,15 @@ class Doubts:
             return quick
         opposite, offset, motion = lone_thing.opposite(scene, at), at.range_offset, at.motion_distortion
         strained = at.stretch is not None or evidence.size_gain > SIZE_GAIN
-        moved = None if strained else motion
+        offset = offset if offset is not None and offset.told and not strained else None
+        moved = None if strained or (offset and motion and not motion.explains(offset.close)) else motion
         return replace(
             quick,
             lone_thing=opposite is not None and scene.pair.allows(opposite),
             one_place=rivalled(at, found),
             corner=corner.bare_corner(at) and corner.others_allowed(scene.pair, at),
             stretch=at.stretch,
-            range_offset=offset
-            if offset is not None and offset.told and not strained and not moved
-            else None,
+            range_offset=None if moved else offset,
             motion_distortion=moved,
             bend=None if strained else at.bend,
             traffic=None if scene.pair.drawn else at.traffic,

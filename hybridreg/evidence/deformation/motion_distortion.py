@@ -42,6 +42,9 @@ _REACH, _EXPLAINED = 3.0, 0.08
 # Nats per point that it must gain: by hand. Of 18 real pairs and 32 of `sim:val` two gain more than 0.08, both taken by
 # sensors that moved; a turn by three degrees gains 0.25 and more, where the sensor looks around.
 _GAIN = 0.15
+# Nats per point by which it must lie closer than a strain, or an offset of all ranges, that has one amount to fit; by
+# hand.
+_BETTER = 0.1
 # Share of the cloud's points that must lie near the other's surfaces then: few fit any motion. By hand; of 240 right
 # poses of `sim:val` three gain as much, with a third of the points at most.
 _NEAR = 0.4
@@ -57,8 +60,10 @@ class MotionDistortion(NamedTuple):
     side : "source" or "target"
     degrees, metres : float
         By which it turned about the vertical, and moved on the level, from the start of the sweep to its end.
+    close : float
+        Nats per point by which the cloud lies closer to the other's surfaces than by chance, its motion undone.
     gain : float
-        Nats per point by which the cloud lies closer to the other's surfaces than under any rigid pose near by.
+        By which that is more than under any rigid pose near by.
     beyond : bool
         Whether the pose is off by more than the tolerance: at the middle of the sweep, or at its start and end, since
         nobody knows which moment it is for.
@@ -67,8 +72,13 @@ class MotionDistortion(NamedTuple):
     side: Side
     degrees: float
     metres: float
+    close: float
     gain: float
     beyond: bool
+
+    def explains(self, close: float) -> bool:
+        """Whether it explains the clouds better than another deformation that lies so `close`, and has less to fit."""
+        return self.close >= close + _BETTER
 
 
 def motion_distortion(views: Views, T_target_source: Array) -> MotionDistortion | None:
@@ -108,6 +118,7 @@ def _moved(views: Views, onto: Onto, side: Side, T: Array) -> MotionDistortion |
         side=side,
         degrees=float(np.degrees(turn)),
         metres=metres,
+        close=close,
         gain=gain,
         beyond=not (off.within(allowed) and half.within(allowed)),
     )
