@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from hybridreg.evidence import information, traffic
+from hybridreg.evidence import information, one_thing, traffic
 from hybridreg.evidence.agreement import Agreement, compare
 from hybridreg.evidence.deformation import bend, heights, motion_distortion, range_offset, scale, stretch
 from hybridreg.evidence.deformation.bend import Bend
@@ -93,3 +93,8 @@ class PoseEvidence:
     def traffic(self) -> Array | None:
         """The direction (3,) along which vehicles alone hold the pose, if any."""
         return traffic.held_along(self.views, self.agreement)
+
+    @cached_property
+    def one_thing(self) -> Array | None:
+        """The direction (3,) along which one thing alone holds the pose, and the rest contradicts it, if any."""
+        return one_thing.held_by_one(self.views, self.T, self.agreement)

@@ -65,6 +65,8 @@ class Doubts:
         How far away a part of a map lies better.
     traffic : (3,) float64 or None
         Direction along which vehicles alone hold the pose.
+    one_thing : (3,) float64 or None
+        Direction along which one thing alone holds it, while the rest contradicts it.
     """
 
     slack: Tolerance | None
@@ -78,6 +80,7 @@ class Doubts:
     motion_distortion: MotionDistortion | None = None
     bend: Bend | None = None
     traffic: Array | None = None
+    one_thing: Array | None = None
 
     def __bool__(self) -> bool:
         return self.about_pose or self.about_source
@@ -85,7 +88,7 @@ class Doubts:
     @property
     def about_pose(self) -> bool:
         """Whether another pose may be right."""
-        found = any(each is not None for each in (self.slack, self.traffic, self.one_place))
+        found = any(each is not None for each in (self.slack, self.traffic, self.one_thing, self.one_place))
         return self.through_walls or self.alike or self.lone_thing or self.corner or found
 
     @property
@@ -122,6 +125,7 @@ class Doubts:
             motion_distortion=moved,
             bend=None if strained else at.bend,
             traffic=None if scene.pair.drawn else at.traffic,
+            one_thing=None if scene.pair.drawn else at.one_thing,
         )
 
 

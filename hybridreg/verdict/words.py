@@ -73,6 +73,7 @@ def reasons(
         *_in_motion(doubts.motion_distortion),
         *_bent(doubts.bend),
         *_with_traffic(doubts.traffic),
+        *_with_one_thing(doubts.one_thing),
         *_against(evidence, agreement, held, doubts.through_walls),
         *_from_one_side(doubts.lone_thing),
         *_in_a_corner(doubts.corner),
@@ -199,6 +200,15 @@ def _with_traffic(direction: Array | None) -> Iterator[str]:
             f"along ({_words(direction)}) of the target nothing holds the pose but things no larger than vehicles: if "
             "they drove on between the scans, the pose follows them; check it by odometry, or take scans where walls, "
             "signs or bridges face along the road"
+        )
+
+
+def _with_one_thing(direction: Array | None) -> Iterator[str]:
+    if direction is not None:
+        yield (
+            f"along ({_words(direction)}) of the target one thing alone holds the pose, and most of what else faces "
+            "that way lies elsewhere: if that thing moved between the scans, the pose follows it; crop it out of both "
+            "clouds, or check by another pair"
         )
 
 
