@@ -115,6 +115,7 @@ class PointCloud:
         drop = nonfinite == "drop" or recorded.holed or ros_messages.is_cloud(x)
         kept, rows = gate.finite(raw, name, drop=drop)
         kept, rows = gate.returned(kept, rows, name, drop=drop)
+        gate.columns(kept, name)
         gate.rounded(kept if recorded.corners is None else recorded.corners, name)
         said = given(viewpoint, len(raw), name)
         if recorded.places is not None and isinstance(viewpoint, str) and viewpoint == "auto":

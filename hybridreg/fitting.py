@@ -154,6 +154,7 @@ def check_scene(scene: Scene, given: Pair) -> None:
     doubts = units.doubts(given if scene.pair.drawn else scene.pair)
     for name, text in doubts.items():
         _warn(f"{name}: {text}")
+    _check_flat(given)
     for name, cloud, level in (
         ("source", scene.pair.source, scene.source),
         ("target", scene.pair.target, scene.target),
@@ -188,6 +189,23 @@ def check_scene(scene: Scene, given: Pair) -> None:
                 f"{name}: half of the points lie {'beyond' if reach > _FARTHEST else 'within'} {reach:.3g} m of the "
                 f"cloud's middle; lengths here are metres, are yours {unit}?"
             )
+
+
+def _check_flat(pair: Pair) -> None:
+    # Of a cloud and a flat scan, whose heights were lost more often than it has none.
+    clouds = {"source": pair.source, "target": pair.target}
+    level = {
+        name: [k for k in range(3) if np.ptp([b[k] for b in cloud.bounds]) == 0.0]
+        for name, cloud in clouds.items()
+    }
+    flat = [name for name, axes in level.items() if axes]
+    if len(flat) == 1:
+        name, other = flat[0], "target" if flat[0] == "source" else "source"
+        axis = level[name][0]
+        _warn(
+            f"{name}: all its {'xyz'[axis]} are {clouds[name].bounds[0][axis]:g}, and the {other} is no flat scan; "
+            f"give the column that was lost, or cut the {other} at the height of the scan"
+        )
 
 
 def _warn(text: str) -> None:

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybridreg.io.meaning.farthest_shell import farthest_shell
+from hybridreg.io.meaning.no_coordinate import no_coordinate
 from hybridreg.io.meaning.shared_place import shared_place
 from hybridreg.io.point_objects import points_of
 
@@ -203,6 +204,13 @@ def rounded(points: Array, name: str) -> None:
         _tell_rounded(name, "written with six digits", "with more digits, or binary", sixth)
     elif step > _COARSE and not _on_grid(some, steps):
         _tell_rounded(name, "kept in single precision", "in double precision", step)
+
+
+def columns(points: Array, name: str) -> None:
+    """Warn of a column that is no coordinate: the number of a ring, an intensity, another column once more."""
+    problem = no_coordinate(points)
+    if problem:
+        warnings.warn(f"{name}: {problem}", UserWarning, stacklevel=4)
 
 
 def _on_grid(some: Array, steps: Array) -> bool:
