@@ -40,6 +40,10 @@ CLOSELY = 0.4
 # Of 279 right poses on `sim:val`, refined or not, none has more than half as many. Where the source is stretched, or of
 # another size, the ground's relief may still agree, and nothing else does.
 _THROUGH = 20
+# Share of either cloud's visible points that the other sensor saw through, above which a pose is not "ok": by hand. Of
+# some 190 right poses that would be (real, `sim:val`, hard kinds with even seeds, made halls in which everything moved)
+# one has more; wrong ones of few points, or that follow a thing which moved, have 0.2 to 0.5.
+_ONE_SIDED = 0.2
 # Log-odds by which the best rival must lie behind for an "ok": its own are no surer than the pose's. By hand: of made
 # halls, racks, tunnels and pipes that repeat exactly, six wrong poses led by 3.7 to 4.4; of 68 pairs of `sim:val` and
 # hard kinds with even seeds, two right ones lead by 3.5 to 4.5.
@@ -108,7 +112,7 @@ def confidence(evidence: Evidence, rule: Boosted | None = None) -> float:
         return min(probability, _OVERTURNED)
     resized, close = told["size_gain"] > SIZE_GAIN, told["rival_margin"] > -CLEAR
     bounded = resized or close or on_one_surface(evidence) or evidence.closely < CLOSELY
-    bounded = bounded or mostly_through(evidence) or _but_for_the_ground(evidence)
+    bounded = bounded or mostly_through(evidence) or _but_for_the_ground(evidence) or one_sided(evidence)
     return min(probability, DOUBTED) if bounded else probability
 
 
@@ -149,6 +153,11 @@ def _but_for_the_ground(evidence: Evidence) -> bool:
 def mostly_through(evidence: Evidence) -> bool:
     """Whether of the points that do not face the commonest axis more are seen through than agree."""
     return evidence.through_rare > max(_THROUGH, evidence.agreed_rare)
+
+
+def one_sided(evidence: Evidence) -> bool:
+    """Whether one of the clouds is seen through by much, whatever the other is."""
+    return max(evidence.looked_through_source, evidence.looked_through_target) > _ONE_SIDED
 
 
 def _one_of_two(told: Mapping[str, float], rule: Boosted) -> bool:

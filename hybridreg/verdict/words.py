@@ -24,6 +24,7 @@ from hybridreg.verdict.confidence import (
     SPARSE,
     mostly_through,
     on_one_surface,
+    one_sided,
 )
 from hybridreg.verdict.doubts import Doubts
 from hybridreg.verdict.one_place import Rivalled
@@ -88,7 +89,7 @@ def _against(
     evidence: Evidence, agreement: Agreement, held: Information, through_walls: bool
 ) -> Iterator[str]:
     through = evidence.looked_through
-    if through > LOOKED_THROUGH:
+    if through > LOOKED_THROUGH or one_sided(evidence):
         yield (
             f"free space is violated: the sensors saw through {through:.0%} of the points that they should have hit "
             f"({evidence.looked_through_source:.0%} of the source's, "

@@ -131,6 +131,13 @@ def test_no_pose_is_ok_at_which_more_is_seen_through_than_agrees(
     assert word(confidence(replace(evidence, agreed_rare=agreed, through_rare=agreed + more))) != "ok"
 
 
+@given(whole, st.floats(0.21, 1.0), st.sampled_from(["source", "target"]))
+def test_nor_one_at_which_either_cloud_is_seen_through_by_much(
+    evidence: Evidence, through: float, side: str
+) -> None:
+    assert word(confidence(replace(evidence, **{f"looked_through_{side}": through}))) != "ok"
+
+
 @given(odds, st.floats(NO_RIVAL, 10.0))
 def test_a_pose_is_no_likelier_than_against_its_rival_alone(odds: float, margin: float) -> None:
     assert believed(odds, margin) <= 1.0 / (1.0 + np.exp(margin))
