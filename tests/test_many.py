@@ -50,9 +50,9 @@ def test_a_prepared_target_gives_the_same_and_its_points_are_gone_through_once(
     assert len(target) == len(world)
     gone_through: list[int] = []
 
-    def counted(points: np.ndarray, cell: float) -> np.ndarray:
+    def counted(points: np.ndarray, cell: float, *name: str) -> np.ndarray:
         gone_through.append(len(points))
-        return voxel_centroids(points, cell)
+        return voxel_centroids(points, cell, *name)
 
     monkeypatch.setattr(voxel, "voxel_centroids", counted)
     for again in (False, True):

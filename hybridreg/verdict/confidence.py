@@ -43,7 +43,7 @@ _THROUGH = 20
 # Share of either cloud's visible points that the other sensor saw through, above which a pose is not "ok": by hand. Of
 # some 190 right poses that would be (real, `sim:val`, hard kinds with even seeds, made halls in which everything moved)
 # one has more; wrong ones of few points, or that follow a thing which moved, have 0.2 to 0.5.
-_ONE_SIDED = 0.2
+ONE_SIDED = 0.2
 # Log-odds by which the best rival must lie behind for an "ok": its own are no surer than the pose's. By hand: of made
 # halls, racks, tunnels and pipes that repeat exactly, six wrong poses led by 3.7 to 4.4; of 68 pairs of `sim:val` and
 # hard kinds with even seeds, two right ones lead by 3.5 to 4.5.
@@ -157,7 +157,7 @@ def mostly_through(evidence: Evidence) -> bool:
 
 def one_sided(evidence: Evidence) -> bool:
     """Whether one of the clouds is seen through by much, whatever the other is."""
-    return max(evidence.looked_through_source, evidence.looked_through_target) > _ONE_SIDED
+    return max(evidence.looked_through_source, evidence.looked_through_target) > ONE_SIDED
 
 
 def _one_of_two(told: Mapping[str, float], rule: Boosted) -> bool:

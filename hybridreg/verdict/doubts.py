@@ -115,7 +115,7 @@ class Doubts:
         strained = at.stretch is not None or evidence.size_gain > SIZE_GAIN
         offset = offset if offset is not None and offset.told and not strained else None
         moved = None if strained or (offset and motion and not motion.explains(offset.close)) else motion
-        return replace(
+        doubts = replace(
             quick,
             lone_thing=opposite is not None and scene.pair.allows(opposite),
             one_place=rivalled(at, found),
@@ -125,8 +125,10 @@ class Doubts:
             motion_distortion=moved,
             bend=None if strained else at.bend,
             traffic=None if scene.pair.drawn else at.traffic,
-            one_thing=None if scene.pair.drawn else at.one_thing,
         )
+        if scene.pair.drawn or doubts.about_source:  # of a deformed cloud most lies elsewhere
+            return doubts
+        return replace(doubts, one_thing=at.one_thing)
 
 
 def is_right_but_for_size(scene: Scene, at: PoseEvidence, evidence: Evidence) -> bool:

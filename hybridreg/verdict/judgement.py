@@ -23,7 +23,7 @@ from hybridreg.scene import Scene
 from hybridreg.search import rivals, settle
 from hybridreg.search.hypothesis import Hypothesis, of_pose
 from hybridreg.search.ranking import best, differs, told_apart
-from hybridreg.verdict.confidence import CLEAR, CLOSELY, DOUBTED, LIKELY, Word, confidence, word
+from hybridreg.verdict.confidence import CLEAR, CLOSELY, DOUBTED, LIKELY, ONE_SIDED, Word, confidence, word
 from hybridreg.verdict.doubts import Doubts, is_right_but_for_size
 from hybridreg.verdict.words import reasons
 
@@ -171,8 +171,14 @@ def _believed(
 
 
 def _undeformed(evidence: Evidence) -> float:
-    # A source that is not deformed lies closely.
-    return confidence(replace(evidence, closely=max(evidence.closely, CLOSELY)))
+    # A source that is not deformed lies closely, and neither cloud is seen through by much.
+    source, target = (
+        min(part, ONE_SIDED) for part in (evidence.looked_through_source, evidence.looked_through_target)
+    )
+    closely = max(evidence.closely, CLOSELY)
+    return confidence(
+        replace(evidence, closely=closely, looked_through_source=source, looked_through_target=target)
+    )
 
 
 def _alone(scene: Scene, at: PoseEvidence, found_by: int = 1) -> Hypothesis:
