@@ -26,6 +26,8 @@ _MARKS = "#/% \t"
 _TURNS = re.compile(r"rot|angle|quat|euler|roll|yaw|rpy|orient|heading|\bdeg|\brad", re.IGNORECASE)
 # Open3D 0.20.0 ends the comment on top of its TUM files by no line break: the first pose stands behind the last name.
 _GLUED = re.compile(r"^([ \t]*#.*<q[wxyz]>)(?=[-+.\d])", re.MULTILINE)
+# ITK's, as SimpleITK and 3D Slicer write them (.tfm, .txt).
+_ITK = "#Insight Transform File"
 _BRACKETS = str.maketrans("[](){}", "      ")
 
 
@@ -39,6 +41,13 @@ def pose_of_text(text: str, name: str) -> Array:
     ValueError
         Several poses, no pose, or as `pose_of_numbers`.
     """
+    if text.startswith(_ITK):
+        problem = "a transform of ITK maps the fixed image to the moving one, in millimetres, x to the left and y back"
+        cure = (
+            "write the matrix that maps the source's points to the target's, its inverse where the target is fixed, in "
+            "the axes of the clouds and in metres, as four lines of four numbers"
+        )
+        raise fault(name, problem, cure)
     text = _GLUED.sub(r"\1\n", text)
     if PUBLISHER in text:
         return pose_of_publisher(text, name)
