@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from hybridreg.evidence.agreement import Agreement, in_target
 from hybridreg.evidence.things import GROUND, things
+from hybridreg.evidence.traffic import LEVEL, least_held
 from hybridreg.evidence.views import Views
 from hybridreg.geometry import se3
 
@@ -19,8 +20,6 @@ Array = NDArray[np.float64]
 
 # Thicknesses of the ground over it from which points belong to a thing, and spacings between two things; by hand.
 _OFF_GROUND, _GAP = 3.0, 2.0
-_LEVEL = 0.6  # sine of the angle between an upright surface's normal and the level, at most; by hand
-_FACING = 0.5  # cosine of the angle between a normal and the direction that it holds, at least; by hand
 # Things that are tried, those of which most agrees; by hand.
 _TRIED = 5
 # Its extent over that of all things, at most: what fills the place, as walls do, does not move; by hand.
@@ -45,18 +44,16 @@ def held_by_one(views: Views, T_target_source: Array, agreement: Agreement) -> A
         np.concatenate([getattr(way, what) for _, way, *_ in rows]) for what in ("looked", "agrees")
     )
     thing = _things(views, T_target_source)
-    upright = looked & (thing != GROUND) & (np.abs(normals @ up) < _LEVEL)
+    upright = looked & (thing != GROUND) & (np.abs(normals @ up) < LEVEL)
     flat, holds = normals @ level.T, upright & agrees
     places = np.concatenate([points for _, _, points, _ in rows]) @ level.T
+    most = _SMALL * _extent(places[thing != GROUND]) if holds.any() else 0.0
     each, counts = np.unique(thing[holds], return_counts=True)
     for one in each[np.argsort(-counts)][:_TRIED]:
         its = thing == one
-        if _extent(places[its]) > _SMALL * _extent(places[thing != GROUND]):
+        if _extent(places[its]) > most:
             continue
-        rest = flat[holds & ~its]
-        along = np.linalg.eigh(rest.T @ rest)[1][:, 0]  # the rest holds least
-        held = (flat @ along) ** 2
-        facing = held > _FACING**2
+        along, held, facing = least_held(flat, holds & ~its)
         by_it, by_rest = (held[facing & holds & which].sum() for which in (its, ~its))
         against = np.count_nonzero(facing & upright & ~agrees & ~its)
         beside = np.count_nonzero(facing & holds & ~its)

@@ -94,6 +94,10 @@ class Surfaces:
             self._known[new] = True
         return self._normals[rows]
 
+    def near(self, points: Array) -> NDArray[np.bool_]:
+        """Which of some points (n, 3) have a partner."""
+        return np.isfinite(self.tree.query(points, distance_upper_bound=self.far)[0])
+
 
 class FineSurfaces(NamedTuple):
     """Both clouds of a pair."""

@@ -28,7 +28,7 @@ _SHORT, _LOW = 0.8, 2.0
 _CROPPED = 2.0
 _OFF_GROUND = 0.3  # metres over the ground from which points belong to a thing; by hand
 _CELL = 0.4  # metres between two things that are told apart; by hand
-_LEVEL = 0.6  # sine of the angle between an upright surface's normal and the level, at most; by hand
+LEVEL = 0.6  # sine of the angle between an upright surface's normal and the level, at most; by hand
 _FACING = 0.5  # cosine of the angle between a normal and the direction that it holds, at least; by hand
 # What fixed things hold of the pose along some direction, beside what vehicles hold: of 24 made poses that follow
 # traffic less than 0.01, of 100 right ones, real and of `sim:val`, 0.3 at least where vehicles hold any.
@@ -57,21 +57,27 @@ def held_along(views: Views, agreement: Agreement) -> Array | None:
     for view, way, points, facing in in_target(views, agreement):
         after = len(views.source.points) if view is views.target else 0
         thing = views.scene.shared(("things", after > 0), partial(_things, view))[view.asked]
-        holds = way.looked & way.agrees & (thing != GROUND) & (np.abs(facing @ up) < _LEVEL)
+        holds = way.looked & way.agrees & (thing != GROUND) & (np.abs(facing @ up) < LEVEL)
         rows.append((points[holds], facing[holds], np.where(thing > 0, thing + after, _FIXED)[holds]))
     points, facing, thing = (np.concatenate(parts) for parts in zip(*rows, strict=True))
     still = thing == _FIXED
     level = views.target.ground.levelling[:2]  # type: ignore[union-attr]
     flat = facing @ level.T
-    along: Array = np.linalg.eigh(flat[still].T @ flat[still])[1][:, 0]  # fixed things hold least
-    held = (flat @ along) ** 2
-    holds = held > _FACING**2
+    along, held, holds = least_held(flat, still)
     fixed, moving = held[holds & still].sum(), held[holds & ~still].sum()
     if moving < _POINTS or fixed > min(_SHARE * moving, _FEW):
         return None
     vehicles, places = np.unique(thing[holds & ~still]), points[holds & ~still] @ level.T @ along
     many = len(vehicles) >= 2 * _VEHICLES and np.ptp(places) > _SPREAD  # each is seen by both sensors
     return along @ level if many else None
+
+
+def least_held(flat: Array, by: NDArray[np.bool_]) -> tuple[Array, Array, NDArray[np.bool_]]:
+    """The level direction (2,) that those of some normals (n, 2) which `by` (n,) marks hold least, how much each of all
+    holds of it (n,), and which hold it (n,)."""
+    along: Array = np.linalg.eigh(flat[by].T @ flat[by])[1][:, 0]
+    held = (flat @ along) ** 2
+    return along, held, held > _FACING**2
 
 
 def _things(view: View) -> Rows:

@@ -40,18 +40,19 @@ def bend(views: Views, T_target_source: Array) -> Bend | None:
     least = _HARM * tolerance(views.scene.pair.source, views.scene.pair.target).metres
     T_source_target = se3.inverse(T_target_source)
     forth = lying_better(Onto.target(views), T_target_source, T_target_source[None], least)
-    back = lying_better(Onto.source(views), T_source_target, _starts(T_source_target, forth), least)
+    starts = np.concatenate([T_source_target[None], _reversed(forth)])
+    back = lying_better(Onto.source(views), T_source_target, starts, least)
     # Of a long slip one way finds what the other does not reach by itself.
     if back and not forth:
-        forth = lying_better(Onto.target(views), T_target_source, _starts(T_target_source, back), least)
+        forth = lying_better(Onto.target(views), T_target_source, _reversed(back), least)
     if not forth or not back:
         return None
     degrees, metres = min((_farthest(parts) for parts in (forth, back)), key=lambda off: off.metres)
     return Bend(degrees, metres)
 
 
-def _starts(T: Array, others: list[Part]) -> Array:
-    return np.array([T, *(se3.inverse(part.T) for part in others)])
+def _reversed(parts: list[Part]) -> Array:
+    return se3.inverse(np.array([part.T for part in parts]).reshape(-1, 4, 4))
 
 
 def _farthest(parts: list[Part]) -> Tolerance:

@@ -127,8 +127,7 @@ def _moved(views: Views, onto: Onto, side: Side, T: Array) -> MotionDistortion |
 def _share_near(onto: Onto, found: Deformed, field: Field) -> float:
     points = onto.fine.asked
     moved = se3.apply(found.T, found.added(points, field(points)))
-    distance = onto.other_fine.tree.query(moved, distance_upper_bound=onto.other_fine.far)[0]
-    return float(np.mean(np.isfinite(distance)))
+    return float(np.mean(onto.other_fine.near(moved)))
 
 
 def _promising(onto: Onto, T: Array) -> list[Field]:

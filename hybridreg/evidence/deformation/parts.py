@@ -102,19 +102,14 @@ def _laid(onto: Onto, starts: Array, points: Array, fine: Array) -> list[Array]:
 
 def _better(onto: Onto, T: Array, to: Array, lots: list[Array]) -> bool:
     # More closely, or more of them near: where the pose lays a part metres off, few have a partner, by chance.
-    surfaces, everything = onto.other_fine, lots[0]
-
-    def closer(points: Array) -> float:
-        return one_way(points, surfaces, to) - one_way(points, surfaces, T)
-
-    def near(points: Array, pose: Array) -> int:
-        distance = surfaces.tree.query(se3.apply(pose, points), distance_upper_bound=surfaces.far)[0]
-        return int(np.count_nonzero(np.isfinite(distance)))
-
-    if near(everything, to) < near(everything, T) or closer(everything) < -_LOSS:
-        return False
-    return any(
-        closer(points) >= _GAIN or near(points, to) + _FEW >= (1.0 + _MORE) * (near(points, T) + _FEW)
-        for points in lots
-        if len(points) >= FEWEST
-    )
+    surfaces = onto.other_fine
+    for k, points in enumerate(lots):
+        if len(points) < FEWEST:
+            continue
+        closer = one_way(points, surfaces, to) - one_way(points, surfaces, T)
+        before, after = (np.count_nonzero(surfaces.near(se3.apply(pose, points))) for pose in (T, to))
+        if k == 0 and (after < before or closer < -_LOSS):  # of all its points
+            return False
+        if closer >= _GAIN or after + _FEW >= (1.0 + _MORE) * (before + _FEW):
+            return True
+    return False
