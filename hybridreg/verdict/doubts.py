@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from hybridreg.evidence import corner, lone_thing
+from hybridreg.evidence import corner, lone_thing, silhouette
 from hybridreg.evidence.covariance import of_information
 from hybridreg.evidence.deformation.bend import Bend
 from hybridreg.evidence.deformation.motion_distortion import MotionDistortion
@@ -51,6 +51,8 @@ class Doubts:
         A rival is likely by itself where little tells which of two is right.
     lone_thing : bool
         One thing is seen from one side, and nothing known beforehand excludes the opposite side.
+    seen_past : bool
+        One thing stands alone in both views, and its outlines do not coincide.
     corner : bool
         Nothing agrees but the planes of one corner of a room, and nothing known beforehand excludes another.
     one_place : Rivalled or None
@@ -73,6 +75,7 @@ class Doubts:
     through_walls: bool
     alike: bool
     lone_thing: bool = False
+    seen_past: bool = False
     corner: bool = False
     one_place: Rivalled | None = None
     stretch: Stretch | None = None
@@ -89,7 +92,8 @@ class Doubts:
     def about_pose(self) -> bool:
         """Whether another pose may be right."""
         found = any(each is not None for each in (self.slack, self.traffic, self.one_thing, self.one_place))
-        return self.through_walls or self.alike or self.lone_thing or self.corner or found
+        one_thing = self.lone_thing or self.seen_past
+        return self.through_walls or self.alike or one_thing or self.corner or found
 
     @property
     def about_source(self) -> bool:
@@ -118,6 +122,7 @@ class Doubts:
         doubts = replace(
             quick,
             lone_thing=opposite is not None and scene.pair.allows(opposite),
+            seen_past=silhouette.seen_past(at.views, evidence.looked_through),
             one_place=rivalled(at, found),
             corner=corner.bare_corner(at) and corner.others_allowed(scene.pair, at),
             stretch=at.stretch,

@@ -77,6 +77,7 @@ def reasons(
         *_with_one_thing(doubts.one_thing),
         *_against(evidence, agreement, held, doubts.through_walls),
         *_from_one_side(doubts.lone_thing),
+        *_past_its_outline(doubts.seen_past),
         *_in_a_corner(doubts.corner),
         *_from_one_place(doubts.one_place),
         *_inexact(doubts.slack),
@@ -219,6 +220,15 @@ def _from_one_side(lone_thing: bool) -> Iterator[str]:
             "one thing stands alone on flat ground, and by this pose both sensors look at the same side of it; from "
             "behind it may look alike. A rough start excludes that: init=T, max_rotation=90 (--init POSE "
             "--max-rotation 90)"
+        )
+
+
+def _past_its_outline(seen_past: bool) -> Iterator[str]:
+    if seen_past:
+        yield (
+            "one thing stands alone in both views, and its outlines do not coincide: the other sensor saw past some of "
+            "its points. A back laid on a front, or on another thing, fits so; keep more of what stands around it, or "
+            "add a view from between"
         )
 
 
