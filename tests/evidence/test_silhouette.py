@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A figure that stands alone is not "ok" with its back laid on its front; from one side it is, and a wall is no figure."""
+"""A figure whose back is laid on its front is not "ok"; seen from one side it is, and a wall has no outline."""
 
 from __future__ import annotations
 
