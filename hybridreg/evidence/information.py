@@ -26,6 +26,8 @@ class Information:
         the target's frame about `centre`.
     centre : (3,) float64
         Mean of those points: the centre of the overlap.
+    radius : float
+        Their root mean square distance from it, metres.
     weakest : float in [0, 1/3]
         Smallest eigenvalue per point, rotations measured in metres at the overlap's radius. A third is the most
         that three directions can share evenly; zero is an unconstrained motion.
@@ -37,6 +39,7 @@ class Information:
 
     matrix: Array
     centre: Array
+    radius: float
     weakest: float
     turns: bool
     direction: Array
@@ -49,6 +52,11 @@ class Information:
         numbers = " ".join(f"{x:.2f}" for x in pointing)
         return f"{'in a turn about' if self.turns else 'along'} {'xyz'[axis]} of the target ({numbers})"
 
+    def loosest(self, count: int) -> Array:
+        """The motions (count, 6) that the surfaces hold least, a metre each: turns (radians), then shifts."""
+        motions = np.linalg.eigh(_in_metres(self.matrix, self.radius))[1].T[:count]
+        return motions / np.repeat([self.radius, 1.0], 3)
+
 
 def measure(agreement: Agreement, target: View) -> Information:
     """Information of the pose under which `agreement` was found."""
@@ -58,6 +66,7 @@ def measure(agreement: Agreement, target: View) -> Information:
         return Information(
             matrix=np.zeros((6, 6)),
             centre=np.zeros(3),
+            radius=1.0,
             weakest=0.0,
             turns=False,
             direction=np.array([1.0, 0.0, 0.0]),
@@ -66,15 +75,22 @@ def measure(agreement: Agreement, target: View) -> Information:
     J = jacobian(points - centre, normals)
     matrix = J.T @ J
     radius = float(np.sqrt(np.mean(np.sum((points - centre) ** 2, axis=1)))) or 1.0
-    scale = np.repeat([1.0 / radius, 1.0], 3)
-    values, vectors = np.linalg.eigh(matrix * np.outer(scale, scale) / len(points))
+    values, vectors = np.linalg.eigh(_in_metres(matrix, radius) / len(points))
     turn, slide = vectors[:3, 0], vectors[3:, 0]
     turns = bool(np.linalg.norm(turn) > np.linalg.norm(slide))
     direction = turn if turns else slide
     return Information(
         matrix=matrix,
         centre=centre,
+        radius=radius,
         weakest=max(float(values[0]), 0.0),
         turns=turns,
         direction=direction / np.linalg.norm(direction),
     )
+
+
+def _in_metres(matrix: Array, radius: float) -> Array:
+    # With turns in metres at that radius.
+    scale = np.repeat([1.0 / radius, 1.0], 3)
+    in_metres: Array = matrix * np.outer(scale, scale)
+    return in_metres

@@ -48,9 +48,6 @@ ONE_SIDED = 0.2
 # halls, racks, tunnels and pipes that repeat exactly, six wrong poses led by 3.7 to 4.4; of 68 pairs of `sim:val` and
 # hard kinds with even seeds, two right ones lead by 3.5 to 4.5.
 CLEAR = 4.5
-# Shares from which nothing speaks against a pose: agreeing, seen through, of the weakest information, visible; by hand.
-# Of 19 pairs of different places (`sim:val`, hard kinds with even seeds) none comes near all of these.
-_ALL, _NONE, _HELD, _SEEN = 0.85, 0.01, 0.005, 0.3
 # Agreeing share of the middle axis below which the pose is not "ok" where so many points face the rarest; by hand. Of
 # some 30 right poses on fields and in maps (`sim:val/degenerate`, hard kinds with even seeds) 0.39 or more of the
 # points agree that do not face the commonest axis; of a wrong one on made relief, half a turn off, 0.01.
@@ -104,9 +101,7 @@ def confidence(evidence: Evidence, rule: Boosted | None = None) -> float:
     rule = rule or trees()
     told = features(evidence)
     probability = believed(rule(told), told["rival_margin"])
-    if probability < FAILED and (
-        _one_of_two(told, rule) or _nothing_against(evidence) or _supported(evidence)
-    ):
+    if probability < FAILED and (_one_of_two(told, rule) or _supported(evidence)):
         probability = FAILED
     if evidence.overturned:
         return min(probability, _OVERTURNED)
@@ -120,18 +115,6 @@ def _supported(evidence: Evidence) -> bool:
     # Sure by the support, and no rival does better. Of 28 poses that the trees alone call "failed" (hard kinds, seeds
     # 420 to 452, and `building-485`) four have a support of 1.8 or more; three are right, and one has a better rival.
     return evidence.support >= OK_LOG_ODDS and evidence.rival_margin < 0.0
-
-
-def _nothing_against(evidence: Evidence) -> bool:
-    # Nearly all of what both saw agrees, hardly any of it is seen through, it holds the pose, and no other does nearly
-    # as well: so it is on hills, where all there is faces up, and most terms find nothing to weigh.
-    return (
-        evidence.agreement_most > _ALL
-        and evidence.looked_through < _NONE
-        and evidence.weakest > _HELD
-        and min(evidence.visible_source, evidence.visible_target) > _SEEN
-        and evidence.rival_margin < -CLEAR
-    )
 
 
 def on_one_surface(evidence: Evidence) -> bool:

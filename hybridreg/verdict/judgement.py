@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from hybridreg.evidence import match_agreement
+from hybridreg.evidence import match_agreement, one_surface
 from hybridreg.evidence.agreement import Agreement, OneWay
 from hybridreg.evidence.deformation.scale import Size
 from hybridreg.evidence.evidence import NO_RIVAL, Evidence, share
@@ -165,9 +165,13 @@ def _believed(
 ) -> tuple[float, Doubts]:
     # The probability by the trees, and what they do not see.
     probability = confidence(evidence)
-    if probability < FAILED and is_right_but_for_size(scene, at, evidence):
+    if probability < FAILED and (is_right_but_for_size(scene, at, evidence) or _is_held(scene, at, evidence)):
         probability = FAILED
     return probability, Doubts.about(scene, at, found, evidence, likely=probability >= FAILED)
+
+
+def _is_held(scene: Scene, at: PoseEvidence, evidence: Evidence) -> bool:
+    return one_surface.holds(at, evidence, tolerance(scene.pair.source, scene.pair.target).metres)
 
 
 def _undeformed(evidence: Evidence) -> float:
