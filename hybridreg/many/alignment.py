@@ -67,8 +67,9 @@ class Alignment:
     @property
     def doubted(self) -> list[int]:
         """Placed clouds that no chain of links that are "ok" joins to the reference. Doubtful links between two groups
-        may all be wrong alike: where the groups are two storeys of one plan, or a cloud is stretched."""
-        sure = [link for link in self._used if link.verdict in ("ok", "given")]
+        may all be wrong alike: where the groups are two storeys of one plan, or a cloud is stretched; and so may given
+        ones, of one source."""
+        sure = [link for link in self._used if link.verdict == "ok"]
         joined = next(group for group in groups(len(self.names), sure) if self.reference in group)
         return [int(k) for k in np.flatnonzero(self.placed) if k not in joined]
 

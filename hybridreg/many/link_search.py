@@ -17,13 +17,14 @@ from hybridreg.geometry import se3
 from hybridreg.geometry.extent import reach
 from hybridreg.geometry.viewpoint import centre
 from hybridreg.many.alignment import Alignment
-from hybridreg.many.links import Link, agrees, all_placed, best_tree, groups, placed
+from hybridreg.many.known_links import checked, judged
+from hybridreg.many.links import DEGREES, Link, agrees, all_placed, best_tree, groups, placed
 from hybridreg.many.other_ways import elsewhere
 from hybridreg.many.overlap_guess import signature, unlike
 from hybridreg.many.pose_graph import optimised
 from hybridreg.pair import Pair
 from hybridreg.pipeline import Pipeline
-from hybridreg.resolution import VEHICLES
+from hybridreg.resolution import Tolerance
 from hybridreg.runtime.open3d import load_open3d
 from hybridreg.runtime.workers import spread
 
@@ -66,7 +67,9 @@ def aligned(
     memory = {} if memory is None else memory
     held = [cloud.keeping() for cloud in clouds]
     middles = np.array([np.median(cloud.points, axis=0) + cloud.offset for cloud in held])
-    links = [_given(rows, T, len(held)) for rows, T in (known or {}).items()]
+    given = [checked(rows, T, len(held)) for rows, T in (known or {}).items()]
+    about = ((a, b, held[a], held[b], T, pipeline, seed) for a, b, T in given)
+    links = list(spread(judged, about, workers, ordered=True, singly=True))
     far = unlike([signature(cloud) for cloud in held])
 
     def tried() -> set[Rows]:
@@ -111,26 +114,6 @@ def aligned(
 def _key(a: int, b: int, poses: Array | None) -> Key:
     start = None if poses is None else se3.inverse(poses[a]) @ poses[b]
     return a, b, None if start is None or not np.isfinite(start).all() else tuple(start.ravel().tolist())
-
-
-def is_row(value: Any, n: int) -> bool:
-    """Whether it counts one of `n` clouds, from 0."""
-    return isinstance(value, (int, np.integer)) and not isinstance(value, bool) and 0 <= int(value) < n
-
-
-def _given(rows: Rows, T: Any, n: int) -> Link:
-    source, target = rows
-    if not (is_row(source, n) and is_row(target, n) and source != target):
-        raise ValueError(f"known: {rows} are no two rows of the {n} clouds")
-    pose = se3.check(T, f"known[{source}, {target}]")
-    return Link(
-        source=source,
-        target=target,
-        T_target_source=pose,
-        verdict="given",
-        confidence=1.0,
-        metres=VEHICLES.metres,
-    )
 
 
 def _linked(
@@ -232,6 +215,11 @@ def _role(link: Link, tree: Sequence[Link], fit: Sequence[Link], poses: Array, m
 
 def _reasons(found: Alignment) -> Iterable[str]:
     for link in found.links:
+        if link.off is not None and not link.off.within(Tolerance(DEGREES, link.metres)):
+            yield (
+                f"{found.names[link.source]} -> {found.names[link.target]} was given {link.off.metres:.2g} m and "
+                f"{link.off.degrees:.1f} deg away from where the clouds lie on one another, and they were believed"
+            )
         if link.role == "contradicts":
             pair = f"{found.names[link.source]} -> {found.names[link.target]} ({link.verdict})"
             yield f"{pair} contradicts the other links and was left out"
@@ -241,8 +229,8 @@ def _reasons(found: Alignment) -> Iterable[str]:
         yield f"{found.names[k]} hangs on one link, which nothing confirms"
     for k in found.doubted:
         yield (
-            f"only doubtful links join {found.names[k]} to {found.names[found.reference]}: "
-            "register it with one of those, and read the reasons"
+            f"only doubtful links, or given ones that the clouds do not confirm, join {found.names[k]} to "
+            f"{found.names[found.reference]}: register it with one of those, and read the reasons"
         )
     for k in found.unsure:
         yield f"{found.names[k]} may lie elsewhere: with rivals of doubtful links as many agree"

@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 Role = Literal["tree", "loop", "contradicts", "failed"]
 
 # Spanning trees that are drawn; degrees that a link may be off, for each root of the links that lie between.
-_TREES, _DEGREES = 300, 2.0
+_TREES, DEGREES = 300, 2.0
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -29,7 +29,7 @@ class Link:
     source, target : int
         Rows of the clouds.
     T_target_source : (4, 4) float64
-    verdict : "ok", "doubtful", "failed", or "given" for a pose of the caller's
+    verdict : "ok", "doubtful", "failed", or "given" for a pose of the caller's that the clouds neither confirm nor deny
     confidence : float in [0, 1]
     metres : float
         How far off a right pose may be.
@@ -37,6 +37,8 @@ class Link:
         What became of it: "contradicts" disagrees with what most others say together.
     rivals : (r, 4, 4) float64
         Other poses that explain both clouds nearly as well.
+    off : Tolerance or None
+        How far away the caller's pose lies, where one was given and the clouds were registered.
     """
 
     source: int
@@ -47,6 +49,7 @@ class Link:
     metres: float
     role: Role = "failed"
     rivals: Array = field(default_factory=lambda: np.zeros((0, 4, 4)))
+    off: Tolerance | None = None
 
 
 def placed(n: int, tree: Iterable[Link], root: int) -> Array:
@@ -74,7 +77,7 @@ def agrees(link: Link, poses: Array, middles: Array) -> bool:
         return False
     centre = se3.apply(wanted, middles[link.source][None])[0]
     off = Tolerance.between(wanted, poses[link.source], centre)
-    return off.metres < link.metres and off.degrees < _DEGREES
+    return off.metres < link.metres and off.degrees < DEGREES
 
 
 def best_tree(

@@ -9,7 +9,8 @@ from typing import Any, Literal
 
 from hybridreg.cloud import PointCloud
 from hybridreg.many.alignment import Alignment
-from hybridreg.many.link_search import Rows, aligned, is_row
+from hybridreg.many.known_links import is_row
+from hybridreg.many.link_search import Rows, aligned
 from hybridreg.pipeline import Pipeline
 from hybridreg.presets import DEFAULT
 
@@ -41,8 +42,9 @@ def register_all(
     names : what they are called; the paths, or `cloud 0` and so on
     ordered : whether neighbours in the sequence were taken near each other, as along a drive
     known : mapping of (row of source, row of target) to (4, 4), or None
-        Poses that you have from elsewhere: links like others, which may be contradicted. These pairs are not
-        registered.
+        Poses that you have from elsewhere, by odometry or satellites. Each pair is registered from there, within four
+        tolerances (2 m and 8 degrees for vehicles), and without it where that is not "ok"; a pose that the clouds
+        neither confirm nor contradict is taken as it is, and leaves the whole "doubtful".
     reference : row of the cloud whose frame all others get
     preset, voxel : as for `register`
     pipeline : instead of a preset
