@@ -1,11 +1,11 @@
 #!/usr/bin/env bash
-# pypose 0.9.5's `metric.ape` and `metric.rpe` have `nposes`, "the number of poses to use for alignment". From 3 on it has no effect: all
-# poses are used, as it cuts the columns x, y and z and not the rows. A trajectory that bends away after a good start has an error of
-# 2.4 m where evo 1.38.1, whose `n` is the same, has 10 m. 1 and 2 are refused by a message about the points' dimension.
+# pypose 0.9.5's `metric.ape` and `metric.rpe` have `nposes`, for an alignment by so many poses. From 3 on it has no effect: all poses
+# are used, as it cuts the columns x, y and z and not the rows. A trajectory that bends away after a good start has an error of 2.4 m
+# where evo 1.38.1, whose `n` is the same, has 10 m. 1 and 2 are refused by a message about the points' dimension.
 #
 # Guess before it was run: the same numbers as evo's for the same call (that `nposes` might not be was noted after the code was read).
-# For whom it matters: whoever scores an odometry by its first poses, to see the drift, and compares with numbers of evo or of a paper: the
-# alignment over all poses hides most of it. Cut the trajectories, align them by `svdtf`, and call `ape` without `align`.
+# For whom it matters: whoever scores an odometry by its first poses, to see the drift, and compares with numbers of evo or of a paper:
+# the alignment over all poses hides most of it. Cut the trajectories, align them by `svdtf`, and call `ape` without `align`.
 set -euo pipefail
 folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT
