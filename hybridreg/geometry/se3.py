@@ -26,6 +26,8 @@ _HOLD = (
     "to_homogenous_matrix",
     "homogeneous_matrix",
 )
+# Where those without a matrix keep a rotation and a translation: kiss_matcher's; by hand.
+_APART = (("rotation", "translation"), ("R", "t"))
 # Where ROS's messages keep theirs, inside of others perhaps.
 _IN_ROS = (("pose", "position", "orientation"), ("transform", "translation", "rotation"))
 
@@ -149,16 +151,14 @@ def check(T: Any, name: str = "T", tolerance: float = 1e-4) -> Array:
     except Exception as error:  # an object of another library may raise anything
         raise ValueError(f"{name}: expected numbers of shape (4, 4) ({error}){_cure_of(T, name)}") from error
     if matrix.shape != (4, 4):
-        cure = _CURES.get(matrix.shape, "")
+        cure = _planar(matrix, name) or _CURES.get(matrix.shape, "")
         if matrix.ndim == 3 and matrix.shape[1:] in (_POSE, (3, 4)):
             cure = _one_of(len(matrix), name)
         raise ValueError(f"{name}: expected shape (4, 4), got {matrix.shape}{cure}")
     if not np.isfinite(matrix).all():
         raise ValueError(f"{name}: the matrix is not finite")
     if not np.allclose(matrix[3], [0, 0, 0, 1], atol=1e-9):
-        raise ValueError(
-            f"{name}: the last row is {matrix[3]}, expected [0 0 0 1]; is the matrix transposed?"
-        )
+        raise ValueError(f"{name}: the last row is {matrix[3]}, expected [0 0 0 1]; {_last_row(matrix[3])}")
     with np.errstate(over="ignore", invalid="ignore"):
         off = _off_orthogonal(matrix[:3, :3])
         determinant = float(np.linalg.det(matrix[:3, :3]))
@@ -189,11 +189,36 @@ def _cure_of(T: Any, name: str) -> str:
                 f"; of a message of ROS: T = numpy.eye(4), T[:3, 3] = x, y, z of its {place}, T[:3, :3] = "
                 f"scipy.spatial.transform.Rotation.from_quat([q.x, q.y, q.z, q.w]).as_matrix() of its {turn}"
             )
+    apart = next((pair for pair in _APART if _size_of(T, pair[0]) == 9 and _size_of(T, pair[1]) == 3), None)
+    if apart and not isinstance(T, dict):
+        R, t = (
+            f"numpy.reshape({name}.{each}, {shape})"
+            for each, shape in zip(apart, ("(3, 3)", "3"), strict=True)
+        )
+        return f"; give numpy.vstack([numpy.column_stack([{R}, {t}]), [0, 0, 0, 1]])"
     if isinstance(T, (tuple, list)) and [_size(each) for each in T] == [9, 3]:
         return "; of a rotation and a translation: numpy.vstack([numpy.column_stack([R, t]), [0, 0, 0, 1]])"
     if isinstance(T, dict):
         return f"; give the matrix in it, of {', '.join(map(str, T))}"[:200]
     return ""
+
+
+def _planar(M: Array, name: str) -> str:
+    """What to do with a pose in the plane, as gtsam's Pose2, spatialmath's SE2 and OpenCV's 2x3 matrices are."""
+    if M.shape not in ((2, 3), (3, 3)) or not np.isfinite(M).all() or not M.any():
+        return ""
+    # Without a shift it is a rotation about z as well.
+    if M.shape == (3, 3) and not (np.allclose(M[2], [0.0, 0.0, 1.0], atol=1e-9) and M[:2, 2].any()):
+        return ""
+    return f"; of a pose in the plane: M, T = numpy.asarray({name}), numpy.eye(4); T[:2, [0, 1, 3]] = M[:2]"
+
+
+def _last_row(row: Array) -> str:
+    if row[:3].any():
+        return "is the matrix transposed?"
+    if row[3] == 0.0:
+        return "if it is the logarithm of a pose, give its scipy.linalg.expm"
+    return "a number there is a scale, which a rigid motion has not: give its rotation and translation"
 
 
 def _one_of(count: int, name: str) -> str:
@@ -223,6 +248,10 @@ def _size(value: Any) -> int:
         return int(np.asarray(value, dtype=np.float64).size)
     except (TypeError, ValueError, OverflowError):
         return 0
+
+
+def _size_of(x: Any, attribute: str) -> int:
+    return _size(getattr(x, attribute)) if _has(x, attribute) else 0
 
 
 def rounded(T: Any, name: str, tolerance: float) -> Array:

@@ -3,6 +3,7 @@ from __future__ import annotations
 
 import re
 from collections import UserList
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -118,6 +119,59 @@ def test_a_turn_about_a_place_leaves_it_but_for_the_shift(numbers: list[float]) 
 def test_a_pose_in_another_shape_is_told_how_to_become_a_matrix(shape: tuple[int, ...], cure: str) -> None:
     with pytest.raises(ValueError, match=f"init: expected shape .*{re.escape(cure)}"):
         se3.check(np.zeros(shape), "init")
+
+
+PLANE = np.array([[0.8, -0.6, 5.0], [0.6, 0.8, -2.0], [0.0, 0.0, 1.0]])
+
+
+@pytest.mark.parametrize("M", [PLANE, PLANE[:2], PLANE.astype(np.float32)])
+def test_a_pose_in_the_plane_is_not_called_a_rotation(M: np.ndarray) -> None:
+    # gtsam 4.3.0's Pose2.matrix(), spatialmath 1.1.18's SE2 and jaxlie 1.5.0's SE2.as_matrix() are 3x3.
+    with pytest.raises(ValueError, match=r"in the plane: (.*)$") as refusal:
+        se3.check(M, "init")
+    told = re.search(r"in the plane: (.*)$", str(refusal.value))
+    assert told is not None
+    names = {"numpy": np, "init": M}
+    exec(told[1], names)
+    T = se3.check(names["T"], "init")
+    assert np.allclose(T[:2, 3], [5.0, -2.0])
+    assert np.allclose(T[:2, :2], [[0.8, -0.6], [0.6, 0.8]])
+
+
+@pytest.mark.parametrize(
+    "R", [np.eye(3), se3.rotation_about(np.array([0.0, 0.0, 0.3])), se3.rotation_about(np.ones(3))]
+)
+def test_a_rotation_alone_is_still_told(R: np.ndarray) -> None:
+    with pytest.raises(ValueError, match="a rotation alone"):
+        se3.check(R, "init")
+
+
+@pytest.mark.parametrize(
+    ("row", "words"),
+    [
+        ([0.0, 0.0, 0.0, 0.5], "a scale"),  # gtsam 4.3.0's Similarity3.matrix()
+        ([0.0, 0.0, 0.0, 0.0], "logarithm"),  # pytransform3d 3.17.0's transform_log_from_transform
+        ([1.0, 2.0, 3.0, 1.0], "transposed"),
+        ([1.0, 0.0, 0.0, 0.0], "transposed"),
+    ],
+)
+def test_a_last_row_tells_what_the_matrix_is(row: list[float], words: str) -> None:
+    with pytest.raises(ValueError, match=f"last row .*{words}"):
+        se3.check(np.vstack([np.eye(4)[:3], row]), "init")
+
+
+@pytest.mark.parametrize(("rotation", "translation"), [("rotation", "translation"), ("R", "t")])
+@pytest.mark.parametrize("shape", [(3,), (3, 1), (1, 3)])
+def test_a_rotation_and_a_translation_apart_are_told_how_to_become_a_matrix(
+    rotation: str, translation: str, shape: tuple[int, ...]
+) -> None:
+    # kiss_matcher 1.0.2's RegistrationSolution
+    T = random_motion(3)
+    solution = SimpleNamespace(**{rotation: T[:3, :3], translation: T[:3, 3].reshape(shape), "valid": True})
+    with pytest.raises(ValueError, match="init: .*; give numpy") as refusal:
+        se3.check(solution, "init")
+    cure = str(refusal.value).rsplit("; give ", 1)[1]
+    assert np.array_equal(se3.check(eval(cure, {"numpy": np, "init": solution}), "init"), T)
 
 
 class Poses(UserList[np.ndarray]):
