@@ -102,6 +102,10 @@ class Doubts:
         beyond = any(one is not None and one.beyond for one in known)
         return self.stretch is not None or self.bend is not None or beyond
 
+    def of_pose(self) -> Doubts:
+        """Those that are not about a deformed cloud."""
+        return replace(self, stretch=None, range_offset=None, motion_distortion=None, bend=None)
+
     @classmethod
     def about(
         cls, scene: Scene, at: PoseEvidence, found: list[Hypothesis], evidence: Evidence, *, likely: bool

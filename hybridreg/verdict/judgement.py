@@ -145,10 +145,13 @@ def weigh(scene: Scene, pose: Pose) -> Weighed:
     evidence = evidence_of(own, found, at.size if pose.found else Size())
     believed, doubts = _believed(scene, at, found, evidence)
     probability = min(believed, DOUBTED) if doubts else believed
-    drawn = None
-    if pose.found and not FAILED <= probability <= DOUBTED and not evidence.overturned:
+    drawn, loose = None, doubts.about_source or evidence.closely < CLOSELY
+    if pose.found and not evidence.overturned and (loose or not FAILED <= probability <= DOUBTED):
         drawn = _drawn(scene, at, found, ok=probability > DOUBTED)
-        probability = (DOUBTED if probability > DOUBTED else FAILED) if drawn else probability
+    if drawn and probability > DOUBTED:
+        probability = DOUBTED
+    elif drawn:  # to a pose that no deformation betters
+        probability, doubts = max(probability, FAILED), doubts.of_pose()
     return Weighed(
         at=at,
         rivals=found,

@@ -75,7 +75,7 @@ def reasons(
         *_bent(doubts.bend),
         *_with_traffic(doubts.traffic),
         *_with_one_thing(doubts.one_thing),
-        *_against(evidence, agreement, held, doubts.through_walls),
+        *_against(evidence, agreement, held, doubts.through_walls, drawn),
         *_from_one_side(doubts.lone_thing),
         *_past_its_outline(doubts.seen_past),
         *_in_a_corner(doubts.corner),
@@ -87,7 +87,7 @@ def reasons(
 
 
 def _against(
-    evidence: Evidence, agreement: Agreement, held: Information, through_walls: bool
+    evidence: Evidence, agreement: Agreement, held: Information, through_walls: bool, drawn: Tolerance | None
 ) -> Iterator[str]:
     through = evidence.looked_through
     if through > LOOKED_THROUGH or one_sided(evidence):
@@ -103,7 +103,7 @@ def _against(
         )
     elif through_walls:
         yield f"free space is violated: the scanners saw through {evidence.looked_through_rare:.0%} of the walls"
-    if evidence.closely < CLOSELY:
+    if evidence.closely < CLOSELY and drawn is None:
         yield (
             f"the points lie hardly closer to the other cloud's surfaces than by chance ({evidence.closely:.2f} nats a "
             f"point; {CLOSELY} and more where a pose is right)"

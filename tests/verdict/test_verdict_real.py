@@ -171,3 +171,18 @@ def test_a_slice_that_lies_hardly_closer_than_by_chance_is_not_ok(real_data: Pat
     result = hr.register(source, target)
     off = Tolerance.between(truth_of(real_data, name), result.transformation, target.mean(axis=0))
     assert off.within(VEHICLES) or result.verdict != "ok"
+
+
+@pytest.mark.parametrize("name", ["sustech-970-to-965", "opencalib-hesai1-qt201-to-p64", "hdl32-small-gicp"])
+def test_a_right_pose_that_nobody_refined_is_told_as_such(real_data: Path, name: str) -> None:
+    if not (real_data / name).is_dir():
+        pytest.skip(f"no pair {name}")
+    scene, truth = scene_of(real_data, name, name), truth_of(real_data, name)
+    middle = se3.apply(truth, views.of(scene).middle)[0]
+    T = se3.about(middle, se3.yaw(0.6)[:3, :3], np.array([0.25, 0.1, 0.0])) @ truth
+    judgement = judge(scene, Pose(T), Correspondences.none())
+    assert judgement.verdict == "doubtful"
+    assert "the surfaces draw the pose" in judgement.reasons[0]
+    others = " ".join(judgement.reasons)
+    assert "closer to the other cloud's surfaces than by chance" not in others
+    assert "deskew" not in others
