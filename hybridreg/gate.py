@@ -140,11 +140,12 @@ def _met(
     found = farthest_shell(points)
     if found is None:
         return points, rows
-    reach, there = found
     if drop:
-        return points[~there], _kept(rows, ~there)
+        return points[~found.there], _kept(rows, ~found.there)
+    place = "the origin" if not found.centre.any() else f"({', '.join(f'{c:.7g}' for c in found.centre)})"
+    others = "all others nearer" if found.farthest else "in all directions"
     warnings.warn(
-        f"{name}: {int(there.sum())} of {len(points)} points lie {reach:.5g} m from the origin, all others nearer, as "
+        f"{name}: {int(found.there.sum())} of {len(points)} points lie {found.reach:.5g} m from {place}, {others}, as "
         f"the ends of simulated rays do that met nothing; remove them{OR_DROP}",
         UserWarning,
         stacklevel=5,
