@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from hybridreg.io.meaning.far_plane import far_plane
 from hybridreg.io.meaning.farthest_shell import farthest_shell
 from hybridreg.io.meaning.no_coordinate import no_coordinate
 from hybridreg.io.meaning.shared_place import shared_place
@@ -208,9 +209,9 @@ def rounded(points: Array, name: str) -> None:
 
 
 def columns(points: Array, name: str) -> None:
-    """Warn of a column that is no coordinate: the number of a ring, an intensity, another column once more."""
-    problem = no_coordinate(points)
-    if problem:
+    """Warn of a column that is no coordinate: the number of a ring, an intensity, another column once more; or that is
+    the far plane of a depth image in many points."""
+    for problem in filter(None, (no_coordinate(points), far_plane(points))):
         warnings.warn(f"{name}: {problem}", UserWarning, stacklevel=4)
 
 

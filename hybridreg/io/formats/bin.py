@@ -9,8 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybridreg.io.faults import fault
-from hybridreg.io.formats.bin_layouts import are_channels, rows_together, wider
-from hybridreg.io.formats.bin_types import refuse_other_types, refuse_time_in_front
+from hybridreg.io.formats.bin_layouts import (
+    are_channels,
+    refuse_other_types,
+    refuse_time_in_front,
+    rows_together,
+    wider,
+)
 from hybridreg.io.meaning.spherical import tell_spherical
 from hybridreg.io.record_fields import stack_axes
 from hybridreg.io.signatures import looks_like_text
