@@ -11,6 +11,9 @@ Array = NDArray[np.float64]
 _FEWEST, _LEAST = 20, 0.01  # points in the plane, and their share
 _SAME = 1e-5  # of its distance, by which two that are the same may differ: single precision, digits of a text
 _NEARER = 0.5  # of its distance; what was seen lies nearer
+_ASIDE = (
+    2.5  # times the distance ahead; no pinhole camera sees what is more aside, as a LiDAR above a floor does
+)
 
 
 def far_plane(points: Array) -> str | None:
@@ -30,6 +33,8 @@ def far_plane(points: Array) -> str | None:
         far = float(high[k] if high[k] > 0.0 else low[k])
         depth = points[:, k] / far
         there = depth >= 1.0 - _SAME
+        if (np.abs(np.delete(points, k, axis=1)).max(axis=1) > _ASIDE * np.abs(points[:, k])).any():
+            continue
         count = int(np.count_nonzero(there))
         if max(_FEWEST, _LEAST * len(points)) <= count < len(points) and depth[~there].max() < _NEARER:
             return (
