@@ -6,6 +6,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from hybridreg.io.meaning.first_column import looked_at
+
 Array = NDArray[np.float64]
 
 _FEWEST, _LEAST = 20, 0.01  # points in the plane, and their share
@@ -22,8 +24,19 @@ def far_plane(points: Array) -> str | None:
 
     A wall without noise behind things that stand out by more than half its distance looks alike.
     """
-    if len(points) < _FEWEST:
+    if len(points) < _FEWEST or _plane(points[looked_at(len(points))]) is None:
         return None
+    found = _plane(points)
+    if found is None:
+        return None
+    axis, far, count = found
+    return (
+        f"{count} of {len(points)} points lie exactly in the plane {axis} = {far:.6g}, all others less than half as "
+        "far, as the pixels of a rendered depth image do that met nothing; remove them if so"
+    )
+
+
+def _plane(points: Array) -> tuple[str, float, int] | None:
     low, high = points.min(axis=0), points.max(axis=0)
     for k in range(3):
         if (
@@ -37,8 +50,5 @@ def far_plane(points: Array) -> str | None:
             continue
         count = int(np.count_nonzero(there))
         if max(_FEWEST, _LEAST * len(points)) <= count < len(points) and depth[~there].max() < _NEARER:
-            return (
-                f"{count} of {len(points)} points lie exactly in the plane {'xyz'[k]} = {far:.6g}, all others less "
-                "than half as far, as the pixels of a rendered depth image do that met nothing; remove them if so"
-            )
+            return "xyz"[k], far, count
     return None
