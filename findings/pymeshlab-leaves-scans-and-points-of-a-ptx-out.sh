@@ -4,7 +4,7 @@
 # returns, such as one between two missing ones: seven in a thousand where one ray in twenty has none, whatever `pointcull` and
 # `anglecull` say. The scan's matrix is applied.
 #
-# Guess before it was run: a mesh for each scan, or all in one, with every return.
+# Guess before it was run: a mesh for each scan, or all in one, with every return (noted after a first odd count).
 # For whom it matters: whoever brings a survey of many setups to PLY or E57 by it and registers the result: what the other setups saw
 # is missing. Before the sky, what is one pixel wide, as wires and distant poles, is lost; rows no longer count pixels.
 set -euo pipefail

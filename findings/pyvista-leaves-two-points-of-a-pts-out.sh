@@ -3,7 +3,7 @@
 # points 598 come back, whether the number of points stands above them or not, with and without intensities and colours. Of two
 # scans in one file it reads the first, less two points, and makes a point of the second's number of points.
 #
-# Guess before it was run: as many points as the first row says.
+# Guess before it was run: as many points as the first row says (noted after a first odd output).
 # For whom it matters: whoever keeps labels, times or partners by the row of a point: row k of the file is row k - 2 there, and no
 # two of a pair lie together; whoever checks a conversion by its counts. For distances between clouds it hardly matters.
 set -euo pipefail

@@ -3,7 +3,8 @@
 # once, at the place of none of them, without a word; its exporter to glTF writes the instances (EXT_mesh_gpu_instancing). Things
 # that are invisible, as those that are hidden to look behind them, are in PLY, OBJ and STL, and not in glTF.
 #
-# Guess before it was run: what is written is what is drawn: each instance, and nothing that is invisible.
+# Guess before it was run: what is written is what is drawn: each instance, and nothing that is invisible (noted after a first odd
+# output).
 # For whom it matters: whoever exports a scene of a web viewer or a digital twin to register scans with: racks, columns, seats or trees
 # are all missing but one, which stands at the origin, where nothing is. Make a mesh of each instance first, and take hidden ones out.
 set -euo pipefail

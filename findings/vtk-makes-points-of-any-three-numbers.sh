@@ -4,7 +4,8 @@
 # two rows; with a colour, twice as many, each second one the colour. At the first word that is no number, such as nan or a comment's #,
 # it stops: what follows is missing. Its error code is 0 each time, and nothing is written to the screen.
 #
-# Guess before it was run: the first three numbers of each row, and an error for a row that holds no number.
+# Guess before it was run: the first three numbers of each row, and an error for a row that holds no number
+# (noted after a first odd output).
 # For whom it matters: whoever loads exported clouds of text by VTK: the mixed cloud has the right size, and lies in the right
 # place in part. `vtkDelimitedTextReader` and `vtkTableToPolyData`, or numpy, read rows.
 set -euo pipefail

@@ -3,7 +3,7 @@
 # the first and the last row, although a depth buffer holds what is seen through the middles of its pixels. The cloud is stretched aside
 # by W / (W - 1) and up by H / (H - 1), not ahead: of 640 pixels by 1.6 mm in a metre, of 64 by 16 mm.
 #
-# Guess before it was run: of a depth buffer, the points of the surface, to rounding.
+# Guess before it was run: of a depth buffer, the points of the surface, to rounding (noted after a first look at the edges).
 # For whom it matters: whoever simulates a camera or a scan by rendering and takes the cloud for the truth of a registration: at the
 # edge of the view each point is half a pixel off, two cameras' clouds of one room fit no single pose, and an estimated scale
 # is not 1. Multiply x by (W - 1) / W and y by (H - 1) / H in the camera's frame.
