@@ -10,9 +10,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from hybridreg.io.meaning.far_plane import far_plane
 from hybridreg.io.meaning.farthest_shell import farthest_shell
 from hybridreg.io.meaning.no_coordinate import no_coordinate
-from hybridreg.io.meaning.shared_place import shared_place
+from hybridreg.io.meaning.shared_place import shared_place, shared_places
 from hybridreg.io.point_objects import points_of
 
 Array = NDArray[np.float64]
@@ -107,10 +108,33 @@ def returned(
     )
     points, rows = _met(points, rows, name, drop=drop)
     place = shared_place(points)
-    if place is None:
+    if place is not None:
+        why = "as missing returns do that were moved with the others, and padding does"
+        points, rows = _away_from(place, why, points, rows, name, drop=drop)
+    there = shared_places(points)
+    if there is None:
         return points, rows
-    why = "as missing returns do that were moved with the others, and padding does"
-    return _away_from(place, why, points, rows, name, drop=drop)
+    problem = "share their places, four and more at each, as missing returns do that were moved with a moving sensor"
+    return _without(there, problem, points, rows, name, drop=drop)
+
+
+def _without(
+    there: NDArray[np.bool_],
+    problem: str,
+    points: Array,
+    rows: NDArray[np.bool_] | None,
+    name: str,
+    *,
+    drop: bool,
+) -> tuple[Array, NDArray[np.bool_] | None]:
+    if drop:
+        return points[~there], _kept(rows, ~there)
+    warnings.warn(
+        f"{name}: {int(np.count_nonzero(there))} of {len(points)} points {problem}; remove them{OR_DROP}",
+        UserWarning,
+        stacklevel=6,
+    )
+    return points, rows
 
 
 def _away_from(
@@ -119,19 +143,11 @@ def _away_from(
     fewest = max(MIN_POINTS, _FILLED * len(points))
     if np.count_nonzero(points[:, 0] == place[0]) < fewest:
         return points, rows
-    good: NDArray[np.bool_] = np.asarray((points != place).any(axis=1))
-    n_bad = len(points) - int(good.sum())
-    if n_bad < fewest or n_bad == len(points):
+    there: NDArray[np.bool_] = np.asarray((points == place).all(axis=1))
+    if np.count_nonzero(there) < fewest or there.all():
         return points, rows
-    if drop:
-        return points[good], _kept(rows, good)
     where = ", ".join(f"{each:.6g}" for each in place)
-    warnings.warn(
-        f"{name}: {n_bad} of {len(points)} points lie exactly at ({where}), {why}; remove them{OR_DROP}",
-        UserWarning,
-        stacklevel=5,
-    )
-    return points, rows
+    return _without(there, f"lie exactly at ({where}), {why}", points, rows, name, drop=drop)
 
 
 def _met(
@@ -140,16 +156,12 @@ def _met(
     found = farthest_shell(points)
     if found is None:
         return points, rows
-    reach, there = found
-    if drop:
-        return points[~there], _kept(rows, ~there)
-    warnings.warn(
-        f"{name}: {int(there.sum())} of {len(points)} points lie {reach:.5g} m from the origin, all others nearer, as "
-        f"the ends of simulated rays do that met nothing; remove them{OR_DROP}",
-        UserWarning,
-        stacklevel=5,
+    place = "the origin" if not found.centre.any() else f"({', '.join(f'{c:.7g}' for c in found.centre)})"
+    others = "all others nearer" if found.farthest else "in all directions"
+    problem = (
+        f"lie {found.reach:.5g} m from {place}, {others}, as the ends of simulated rays do that met nothing"
     )
-    return points, rows
+    return _without(found.there, problem, points, rows, name, drop=drop)
 
 
 def _measured(
@@ -158,19 +170,11 @@ def _measured(
     for height in (float(points[:, 2].min(initial=0.0)), float(points[:, 2].max(initial=0.0))):
         if height not in _NO_HEIGHT:
             continue
-        good = points[:, 2] != height
-        if not good.any() or (np.sign(height) * points[good, 2]).max() > 0.5 * abs(height):
+        there = points[:, 2] == height
+        if there.all() or (np.sign(height) * points[~there, 2]).max() > 0.5 * abs(height):
             continue
-        if drop:
-            points, rows = points[good], _kept(rows, good)
-            continue
-        n_bad = len(points) - int(good.sum())
-        warnings.warn(
-            f"{name}: {n_bad} of {len(points)} points have the height {height:.12g}, which rasters write for cells "
-            f"without data; remove them{OR_DROP}",
-            UserWarning,
-            stacklevel=5,
-        )
+        problem = f"have the height {height:.12g}, which rasters write for cells without data"
+        points, rows = _without(there, problem, points, rows, name, drop=drop)
     return points, rows
 
 
@@ -207,9 +211,9 @@ def rounded(points: Array, name: str) -> None:
 
 
 def columns(points: Array, name: str) -> None:
-    """Warn of a column that is no coordinate: the number of a ring, an intensity, another column once more."""
-    problem = no_coordinate(points)
-    if problem:
+    """Warn of a column that is no coordinate: the number of a ring, an intensity, another column once more; or that is
+    the far plane of a depth image in many points."""
+    for problem in filter(None, (no_coordinate(points), far_plane(points))):
         warnings.warn(f"{name}: {problem}", UserWarning, stacklevel=4)
 
 

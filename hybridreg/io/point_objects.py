@@ -152,7 +152,8 @@ def _from_vtk(x: Any, name: str) -> Array:
         vertices = "x.points" if hasattr(x, "n_points") else "x.GetPoints()"  # of pyvista and of VTK
         cure = f"save its surface as .vtp and give the file, or pass its vertices, {vertices}, where they lie densely"
         _refuse(x, name, f"a surface or a grid is not a cloud; {cure}")
-    return _from_array(vtk_objects.vtk_points(x, name), name)
+    points = _from_array(vtk_objects.vtk_points(x, name), name)
+    return in_metres(points, unit_given(vtk_objects.words_in(x), name), name)
 
 
 def _clouds_of_scene(x: Any) -> Array | None:

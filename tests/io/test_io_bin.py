@@ -202,3 +202,55 @@ def test_few_rows_of_seven_numbers_of_a_radar(n):
     others = np.c_[rng.normal(-10, 12, n), rng.normal(-3, 4, n), rng.normal(0, 0.3, n), np.zeros(n)]
     table = np.c_[points, others].astype("<f4")
     np.testing.assert_array_equal(parse_bin(table.tobytes(), "00123.bin"), table[:, :3])
+
+
+@pytest.mark.parametrize("unit, kind", [(1e3, "i4"), (1e2, "i4"), (1e4, "u4"), (1e3, "i8"), (1e2, "i2")])
+@pytest.mark.parametrize("width", [3, 4])
+def test_whole_numbers_are_refused_with_a_cure_that_works(unit, kind, width):
+    table = rows(2000, 4)[:, :width].astype(float)
+    table[:, :3] *= 0.02 if kind == "i2" else 1.0  # below 128 hundredths
+    table[:, :3] -= table[:, :3].min(axis=0) if kind[0] == "u" else 0.0
+    whole = (table * unit).round().astype(kind)
+    with pytest.raises(ValueError, match="whole ones, not float32; save numpy") as refused:
+        parse_bin(whole.tobytes(), "a.bin")
+    if kind in ("i4", "i8"):
+        assert f"'int{8 * int(kind[1])}'" in str(refused.value)
+
+
+def test_whole_numbers_of_a_map_are_refused():
+    whole = ((rows(2000, 4)[:, :3] + [5e5, 5.4e6, 200.0]) * 100).round().astype("<i4")
+    with pytest.raises(ValueError, match="smaller than 1e-06; save numpy"):
+        parse_bin(whole.tobytes(), "a.bin")
+
+
+def test_missing_returns_of_either_sign_and_tiny_coordinates_are_no_whole_numbers():
+    table = rows(2000, 4)
+    table[:600, :3] = np.nan
+    table[:600:2, :3] *= -1.0
+    assert parse_bin(table.tobytes(), "a.bin").shape == (2000, 3)
+    table = rows(2000, 4)
+    table[:, 1] = table[:, 0] * np.float32(6e-17)  # a half turn in single precision
+    assert parse_bin(table.tobytes(), "a.bin").shape == (2000, 3)
+
+
+@pytest.mark.parametrize(
+    "kind, start, step", [("f8", 1.7e9, 1e-5), ("u8", 1.7e18, 10**4), ("u8", 1.7e15, 10), ("f8", 1.1e9, 0)]
+)
+@pytest.mark.parametrize("more", [0, 1, 2])
+def test_times_of_eight_bytes_in_front_are_refused_with_a_cure_that_works(kind, start, step, more, tmp_path):
+    points = rows(3000, 4 + more)
+    table = np.zeros(3000, [("t", f"<{kind}"), ("xyz", "<f4", 3), ("more", "<f4", more)])
+    table["t"], table["xyz"] = start + np.arange(3000) * step, points[:, :3]
+    table["more"] = points[:, 3 : 3 + more]
+    path = tmp_path / "a.bin"
+    table.tofile(path)
+    with pytest.raises(ValueError, match="begin with a time") as refused:
+        read_points(path)
+    call = str(refused.value).split("save ")[1].removesuffix(" as .npy")
+    np.testing.assert_array_equal(eval(call, {"numpy": np, "path": path}), points[:, :3])
+
+
+def test_a_wall_is_no_time():
+    table = rows(3000, 5)
+    table[:, 1] = 27.17  # the upper half of 1.7e9
+    np.testing.assert_array_equal(parse_bin(table.tobytes(), "a.bin"), table[:, :3])

@@ -234,3 +234,57 @@ def test_points_that_no_face_holds_are_not_left_out_in_silence(tmp_path: Path) -
         ValueError, match="surfaces and 97 points that belong to none; export only the points"
     ):
         read_points(written(tmp_path / "b.vtp", [HUNDRED], faces=[[0, 1, 2]]))
+
+
+def in_unit(word: str, key: str = "units", faces: bool = False) -> Any:
+    """A vtkPolyData whose field data say a unit."""
+    core = pytest.importorskip("vtkmodules.vtkCommonCore")
+    model = pytest.importorskip("vtkmodules.vtkCommonDataModel")
+    support = pytest.importorskip("vtkmodules.util.numpy_support")
+    points, said, data = core.vtkPoints(), core.vtkStringArray(), model.vtkPolyData()
+    points.SetData(support.numpy_to_vtk(HUNDRED, deep=True))
+    said.SetName(key)
+    said.InsertNextValue(word)
+    data.SetPoints(points)
+    data.GetFieldData().AddArray(said)
+    if faces:
+        cells = model.vtkCellArray()
+        for k in range(0, 99, 3):
+            cells.InsertNextCell(3, [k, k + 1, k + 2])
+        data.SetPolys(cells)
+    return data
+
+
+def saved(vtk: Any, data: Any, path: Path) -> Path:
+    writer = vtk.vtkXMLPolyDataWriter()
+    writer.SetFileName(str(path))
+    writer.SetInputData(data)
+    assert writer.Write()
+    return path
+
+
+@pytest.mark.parametrize(
+    "word, key, metres", [("mm", "units", 1e-3), ("ft", "unit", 0.3048), ("centimeters", "Length_Unit", 0.01)]
+)
+def test_a_unit_in_the_field_data_counts(
+    vtk: Any, tmp_path: Path, word: str, key: str, metres: float
+) -> None:
+    data = in_unit(word, key)
+    for x in (saved(vtk, data, tmp_path / "a.vtp"), data):
+        with pytest.warns(UserWarning, match=f"its unit is {metres:g} m"):
+            cloud = hr.PointCloud.of(x)
+        np.testing.assert_allclose(cloud.points, HUNDRED * metres)
+    with pytest.warns(UserWarning, match=f"its unit is {metres:g} m"):
+        surface = read_points(saved(vtk, in_unit(word, key, faces=True), tmp_path / "b.vtp"))
+    assert np.abs(surface).max() <= np.abs(HUNDRED).max() * metres
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("word, key", [("m", "units"), ("mm", "title"), ("dBZ", "units")])
+def test_other_field_data_do_not(vtk: Any, tmp_path: Path, word: str, key: str) -> None:
+    np.testing.assert_array_equal(read_points(saved(vtk, in_unit(word, key), tmp_path / "a.vtp")), HUNDRED)
+
+
+def test_an_angle_in_the_field_data_is_refused(vtk: Any, tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match="deg"):
+        read_points(saved(vtk, in_unit("degrees"), tmp_path / "a.vtp"))

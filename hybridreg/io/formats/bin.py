@@ -9,7 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybridreg.io.faults import fault
-from hybridreg.io.formats.bin_layouts import are_channels, rows_together, wider
+from hybridreg.io.formats.bin_layouts import (
+    are_channels,
+    refuse_other_types,
+    refuse_time_in_front,
+    rows_together,
+    wider,
+)
+from hybridreg.io.meaning.spherical import tell_spherical
 from hybridreg.io.record_fields import stack_axes
 from hybridreg.io.signatures import looks_like_text
 
@@ -46,7 +53,8 @@ def parse_bin(data: bytes, name: str) -> NDArray[np.float64]:
     Raises
     ------
     ValueError
-        Text; a map of COLMAP; a size or values that fit no width, or several.
+        Text; a map of COLMAP; a size or values that fit no width, or several; or as `refuse_other_types` and
+        `refuse_time_in_front`.
     """
     shape = _MAP.match(data)
     if shape is not None:
@@ -55,6 +63,7 @@ def parse_bin(data: bytes, name: str) -> NDArray[np.float64]:
         raise fault(name, problem, "give the cloud that COLMAP fuses of its maps, fused.ply")
     if looks_like_text(data):
         raise fault(name, "is text, not float32 rows", "rename it to end in .txt")
+    refuse_other_types(data, name)
     possible = [width for width in _WIDTHS if len(data) % (4 * width) == 0]
     likely, sure = _width_by_columns(data)
     told = likely if sure else 0
@@ -84,7 +93,9 @@ def parse_bin(data: bytes, name: str) -> NDArray[np.float64]:
 
 
 def _points(rows: NDArray[np.float32], name: str) -> NDArray[np.float64]:
+    refuse_time_in_front(rows, name)
     _refuse_implausible(rows, name)
+    tell_spherical(rows, name)
     return stack_axes(rows[:, 0], rows[:, 1], rows[:, 2])
 
 

@@ -35,6 +35,7 @@ _CURE_BESIDE_Z = f"convert them to x, y and z: range cos(azimuth), range sin(azi
 _ORDERS = ((0, 1, 2), (1, 2, 0), (1, 0, 2), (2, 1, 0))  # azimuth, elevation, range
 _NEARLY = 0.985  # of a turn
 _MOST_BEAMS = 128
+_AT_THE_END = 0.02  # radians by which the first and the last of azimuths around may lie within half a turn
 
 
 def refuse_spherical(names: Iterable[str], name: str) -> None:
@@ -76,6 +77,8 @@ def tell_spherical(rows: NDArray[Any], name: str) -> None:
 
 
 def _turn(azimuth: Array, elevation: Array) -> bool:
+    if np.abs(elevation).max() <= np.pi / 2 and np.ptp(elevation) > 0.0 and _in_radians(azimuth):
+        return True
     kinds = len(np.unique(elevation))
     if not 1 < kinds <= min(_MOST_BEAMS, len(elevation) / 5) or len(np.unique(azimuth)) < 3 * kinds:
         return False
@@ -88,3 +91,9 @@ def _turn(azimuth: Array, elevation: Array) -> bool:
         if around and inside and np.abs(elevation).max() <= turn / 4:
             return True
     return False
+
+
+def _in_radians(azimuth: Array) -> bool:
+    # So near to pi at both ends that the elevations need not be those of beams, as they are not after noise.
+    within = 0.0 <= np.pi - azimuth.max() <= _AT_THE_END and 0.0 <= np.pi + azimuth.min() <= _AT_THE_END
+    return bool(within and len(np.unique(azimuth)) > len(azimuth) / 2)

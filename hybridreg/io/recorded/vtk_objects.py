@@ -46,3 +46,15 @@ def vtk_points(x: Any, name: str) -> Array:
     if held is None or not held.GetNumberOfPoints():
         return np.empty((0, 3))
     return np.array(convert(held.GetData()), dtype=np.float64)
+
+
+def words_in(x: Any) -> dict[str, str]:
+    """The field data of a data set that are one text each, as pyvista's `field_data` holds them, by their names in
+    lower case."""
+    held = x.GetFieldData() if x.IsA("vtkDataSet") else None
+    arrays = [held.GetAbstractArray(k) for k in range(held.GetNumberOfArrays())] if held is not None else []
+    return {
+        str(each.GetName()).lower(): str(each.GetValue(0))
+        for each in arrays
+        if each.IsA("vtkStringArray") and each.GetNumberOfValues() == 1
+    }

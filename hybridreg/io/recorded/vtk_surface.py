@@ -11,7 +11,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from hybridreg.io.coordinate_systems.length_unit import in_metres
 from hybridreg.io.faults import fault, foreign_parser, shorten
+from hybridreg.io.meaning.length_units import unit_given
+from hybridreg.io.recorded import vtk_objects
 from hybridreg.io.recorded.mesh_surface import NO_PLACE, corners, refuse_loose, spread_over
 from hybridreg.io.recorded.recording import Recorded, Selection
 from hybridreg.runtime.optional_packages import load
@@ -20,7 +23,8 @@ Array = NDArray[np.float64]
 
 
 def read_vtp(path: Path, selection: Selection) -> Recorded:
-    """Read a `.vtp` file, all its pieces, in its own frame and unit, in whatever way its numbers are stored.
+    """Read a `.vtp` file, all its pieces, in its own frame, in whatever way its numbers are stored; in metres where
+    its field data name another unit (`units`, a text).
 
     Polygons and strips of triangles are a surface, which becomes points as any mesh's does (`read_mesh`); points that
     belong to none of them are left out then, or refused where they are the most (`refuse_loose`). A file without faces
@@ -40,6 +44,7 @@ def read_vtp(path: Path, selection: Selection) -> Recorded:
         raise fault(name, "holds no points", "save the points or the surface, not the fields alone")
     convert = load("vtkmodules.util.numpy_support", f"{name}: a file of VTK").vtk_to_numpy
     points = np.array(convert(data.GetPoints().GetData()), dtype=np.float64).reshape(-1, 3)
+    points = in_metres(points, unit_given(vtk_objects.words_in(data), name), name)
     triangles = _triangles(data, points, convert, name)
     if not len(triangles):
         return Recorded(points)

@@ -59,13 +59,41 @@ def _rings() -> Array:
         _rings(),
         np.vstack([0.3 * _rings()[-3600:], _rings()[:1800]]),  # one ring that nothing hides, about near ones
         np.round(np.linalg.norm(P, axis=1) * 2.0)[:, None] / 2.0 * _ways(len(P)) + [0.0, 0.0, 1e-9],  # bins
-        np.vstack([P, 30.0 * _ways(3000)]) + [500_000.0, 5_400_000.0, 300.0],  # the origin is no sensor's
+        np.vstack([P[P[:, 0] > 0.0], 0.999 * _ways(20_000)]),  # a ball that was seen
+        P / np.abs(P).max(axis=1)[:, None] * [20.0, 15.0, 3.0] + [7.0, 0.0, 1.0],  # a room
+        0.3 * np.round(P / 0.3),  # a grid
         np.vstack([P, 30.0 * _ways(150)]),  # few
     ],
-    ids=["dome", "cut", "rings", "one ring", "bins", "map", "few"],
+    ids=["dome", "cut", "rings", "one ring", "bins", "ball", "room", "grid", "few"],
 )
 def test_what_lies_far_for_another_reason_is_left_alone(cloud: Array) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         assert len(PointCloud.of(cloud, nonfinite="drop")) == len(cloud)
         PointCloud.of(cloud)
+
+
+@pytest.mark.parametrize("place", [[0.0, 0.0, 1.8], [40.0, -7.0, 1.0], [500_000.0, 5_400_000.0, 300.0]])
+@pytest.mark.parametrize("up", [0.05, 0.5, 1.0])
+def test_a_sphere_about_another_place_is_told_and_dropped(place: list[float], up: float) -> None:
+    cloud = np.vstack([P, 60.0 * _ways(3000, up)]) + place
+    with pytest.warns(UserWarning, match="target: 3000 of 23000 points lie 60 m from .*, all others nearer"):
+        PointCloud.of(cloud, name="target")
+    kept = PointCloud.of(cloud, nonfinite="drop")
+    assert (len(kept), kept.dropped) == (len(P), 3000)
+
+
+def test_a_sphere_about_another_place_in_digits_and_single_precision() -> None:
+    cloud = np.vstack([P, 60.0 * _ways(3000)]) + [40.0, -7.0, 1.0]
+    for stored in (np.round(cloud, 2), cloud.astype("f4")):
+        assert len(PointCloud.of(stored, nonfinite="drop")) == len(P)
+
+
+@pytest.mark.parametrize("stored", [lambda p: p, lambda p: p.astype("f4")])
+def test_distances_of_minus_one_are_told_and_dropped(stored: object) -> None:
+    cloud = stored(np.vstack([P, -_ways(3000)]))  # type: ignore[operator]
+    with pytest.warns(
+        UserWarning, match="target: 3000 of 23000 points lie 1 m from the origin, in all directions"
+    ):
+        PointCloud.of(cloud, name="target")
+    assert len(PointCloud.of(cloud, nonfinite="drop")) == len(P)

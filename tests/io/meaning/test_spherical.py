@@ -93,6 +93,8 @@ def test_the_cure_beside_a_height_keeps_it(names: tuple[str, ...]) -> None:
         SPHERE[:, [1, 0, 2]],
         np.column_stack([np.radians(CENTRED[:, :2]), RANGE]),
         np.column_stack([SPHERE, G.random(2000)]),
+        np.column_stack([np.radians(CENTRED[:, 0]), G.uniform(-0.4, 0.3, 2000), RANGE]),  # of no beams
+        np.column_stack([RANGE, np.radians(CENTRED[:, 0]), G.uniform(-0.4, 0.3, 2000)]),
     ],
 )
 def test_angles_without_names_are_told(rows: np.ndarray, tmp_path: Path) -> None:
@@ -115,6 +117,8 @@ X, Y = np.meshgrid(np.linspace(0.0, 360.0, 361), np.linspace(0.0, 80.0, 41))
         SPHERE + [30.0, 0.0, 0.0],
         SPHERE * [1.0, 10.0, 1.0],
         np.column_stack([AZIMUTH, G.random(2000) * 30, RANGE]),
+        np.column_stack([np.radians(CENTRED[:, 0]) * 1.01, G.uniform(-0.4, 0.3, 2000), RANGE]),
+        np.column_stack([np.radians(CENTRED[:, 0]), G.uniform(-2.0, 2.0, 2000), RANGE]),
     ],
 )
 def test_clouds_that_only_resemble_angles_are_read(rows: np.ndarray) -> None:
