@@ -11,12 +11,21 @@ from numpy.typing import NDArray
 
 from hybridreg.evidence import information, one_thing, traffic
 from hybridreg.evidence.agreement import Agreement, compare
-from hybridreg.evidence.deformation import bend, heights, motion_distortion, range_offset, scale, stretch
+from hybridreg.evidence.deformation import (
+    bend,
+    heights,
+    motion_distortion,
+    range_offset,
+    scale,
+    second_layer,
+    stretch,
+)
 from hybridreg.evidence.deformation.bend import Bend
 from hybridreg.evidence.deformation.deformed import Deformed, Onto, closeness_of
 from hybridreg.evidence.deformation.motion_distortion import MotionDistortion
 from hybridreg.evidence.deformation.range_offset import RangeOffset
 from hybridreg.evidence.deformation.scale import Size
+from hybridreg.evidence.deformation.second_layer import SecondLayer
 from hybridreg.evidence.deformation.stretch import Stretch
 from hybridreg.evidence.evidence import Evidence
 from hybridreg.evidence.information import Information
@@ -79,6 +88,11 @@ class PoseEvidence:
     def bend(self) -> Bend | None:
         """How far away a part of a map lies better, if one does."""
         return bend.bend(self.views, self.T)
+
+    @cached_property
+    def second_layer(self) -> SecondLayer | None:
+        """Much of a cloud that lies on the other one elsewhere, if any."""
+        return second_layer.second_layer(self.views, self.T)
 
     def _explained(self, fitted: Array) -> bool:
         # Whether an offset of the ranges, or a sensor's motion, lets the clouds lie more closely than another

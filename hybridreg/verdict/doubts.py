@@ -13,6 +13,7 @@ from hybridreg.evidence.covariance import of_information
 from hybridreg.evidence.deformation.bend import Bend
 from hybridreg.evidence.deformation.motion_distortion import MotionDistortion
 from hybridreg.evidence.deformation.range_offset import RangeOffset
+from hybridreg.evidence.deformation.second_layer import SecondLayer
 from hybridreg.evidence.deformation.stretch import Stretch
 from hybridreg.evidence.evidence import Evidence
 from hybridreg.evidence.log_odds import FAILED
@@ -65,6 +66,8 @@ class Doubts:
         How a sensor moved while it measured; no doubt where the pose lies within the tolerance.
     bend : Bend or None
         How far away a part of a map lies better.
+    second_layer : SecondLayer or None
+        Much of a cloud that lies on the other one elsewhere.
     traffic : (3,) float64 or None
         Direction along which vehicles alone hold the pose.
     one_thing : (3,) float64 or None
@@ -82,6 +85,7 @@ class Doubts:
     range_offset: RangeOffset | None = None
     motion_distortion: MotionDistortion | None = None
     bend: Bend | None = None
+    second_layer: SecondLayer | None = None
     traffic: Array | None = None
     one_thing: Array | None = None
 
@@ -100,11 +104,14 @@ class Doubts:
         """Whether a cloud is deformed, so that no pose is right."""
         known = (self.range_offset, self.motion_distortion)
         beyond = any(one is not None and one.beyond for one in known)
-        return self.stretch is not None or self.bend is not None or beyond
+        found = any(each is not None for each in (self.stretch, self.bend, self.second_layer))
+        return found or beyond
 
     def of_pose(self) -> Doubts:
         """Those that are not about a deformed cloud."""
-        return replace(self, stretch=None, range_offset=None, motion_distortion=None, bend=None)
+        return replace(
+            self, stretch=None, range_offset=None, motion_distortion=None, bend=None, second_layer=None
+        )
 
     @classmethod
     def about(
@@ -133,6 +140,7 @@ class Doubts:
             range_offset=None if moved else offset,
             motion_distortion=moved,
             bend=None if strained else at.bend,
+            second_layer=None if strained else at.second_layer,
             traffic=None if scene.pair.drawn else at.traffic,
         )
         if scene.pair.drawn or doubts.about_source:  # of a deformed cloud most lies elsewhere

@@ -9,10 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybridreg.evidence.agreement import Agreement
-from hybridreg.evidence.deformation.bend import Bend
-from hybridreg.evidence.deformation.motion_distortion import MotionDistortion
-from hybridreg.evidence.deformation.range_offset import RangeOffset
-from hybridreg.evidence.deformation.stretch import Stretch
 from hybridreg.evidence.evidence import Evidence
 from hybridreg.evidence.information import Information
 from hybridreg.resolution import Tolerance
@@ -20,12 +16,12 @@ from hybridreg.verdict.confidence import (
     CLEAR,
     CLOSELY,
     LIKELY,
-    SIZE_GAIN,
     SPARSE,
     mostly_through,
     on_one_surface,
     one_sided,
 )
+from hybridreg.verdict.deformation_words import of_deformed_clouds, three
 from hybridreg.verdict.doubts import Doubts
 from hybridreg.verdict.one_place import Rivalled
 
@@ -69,10 +65,7 @@ def reasons(
     against = (
         *_elsewhere(drawn),
         *_upside_down(evidence),
-        *_strained(evidence, doubts.stretch),
-        *_off_in_range(doubts.range_offset),
-        *_in_motion(doubts.motion_distortion),
-        *_bent(doubts.bend),
+        *of_deformed_clouds(evidence, doubts),
         *_with_traffic(doubts.traffic),
         *_with_one_thing(doubts.one_thing),
         *_against(evidence, agreement, held, doubts.through_walls, drawn),
@@ -151,55 +144,10 @@ def _upside_down(evidence: Evidence) -> Iterator[str]:
         )
 
 
-def _strained(evidence: Evidence, stretch: Stretch | None) -> Iterator[str]:
-    resized = evidence.size_gain > SIZE_GAIN
-    if stretch and not stretch.is_size:
-        yield (
-            f"the source fits better when it is stretched by {100.0 * (stretch.factor - 1.0):+.1f} % along "
-            f"({_words(stretch.direction)}) of the target, so no rigid pose is right: was it taken in motion, is an "
-            "axis in another unit, or does the map bend? Undo that first, or register a smaller part"
-        )
-    elif stretch or resized:
-        scale = evidence.scale if resized or not stretch else 0.5 * (stretch.factor + stretch.across)
-        yield (
-            f"the source fits better when it is multiplied by {scale:.3f}: "
-            "is it scaled, or its sensor's calibration off?"
-        )
-
-
-def _off_in_range(offset: RangeOffset | None) -> Iterator[str]:
-    if offset is not None:
-        than = "longer" if offset.metres > 0.0 else "shorter"
-        harm = ", and the pose moves by more than the tolerance then" if offset.beyond else ""
-        yield (
-            f"the source fits better when all its ranges are {abs(offset.metres):.2f} m {than}{harm}: is the range "
-            "offset of one of the sensors calibrated?"
-        )
-
-
-def _in_motion(motion: MotionDistortion | None) -> Iterator[str]:
-    if motion is not None:
-        harm = ", so that no rigid pose is right" if motion.beyond else ""
-        yield (
-            f"the {motion.side} fits better when its sensor turned by {motion.degrees:.1f} deg and moved by "
-            f"{motion.metres:.2f} m within one sweep{harm}: undo its motion by the times of its points (deskew it) "
-            "before it is registered"
-        )
-
-
-def _bent(bend: Bend | None) -> Iterator[str]:
-    if bend is not None:
-        yield (
-            f"a part of the clouds fits better {bend.metres:.2g} m and {bend.degrees:.1f} deg away from where the pose "
-            "lays it, so that no rigid pose is right: does a map drift or bend? Close its loops, or register smaller "
-            "parts"
-        )
-
-
 def _with_traffic(direction: Array | None) -> Iterator[str]:
     if direction is not None:
         yield (
-            f"along ({_words(direction)}) of the target nothing holds the pose but things no larger than vehicles: if "
+            f"along ({three(direction)}) of the target nothing holds the pose but things no larger than vehicles: if "
             "they drove on between the scans, the pose follows them; check it by odometry, or take scans where walls, "
             "signs or bridges face along the road"
         )
@@ -208,7 +156,7 @@ def _with_traffic(direction: Array | None) -> Iterator[str]:
 def _with_one_thing(direction: Array | None) -> Iterator[str]:
     if direction is not None:
         yield (
-            f"along ({_words(direction)}) of the target one thing alone holds the pose, and most of what else faces "
+            f"along ({three(direction)}) of the target one thing alone holds the pose, and most of what else faces "
             "that way lies elsewhere: if that thing moved between the scans, the pose follows it; crop it out of both "
             "clouds, or check by another pair"
         )
@@ -265,15 +213,11 @@ def _inexact(slack: Tolerance | None) -> Iterator[str]:
 
 
 def _about_axis(agreement: Agreement, k: int) -> str:
-    direction = _words(agreement.axes[k])
+    direction = three(agreement.axes[k])
     looked, agreed = int(agreement.looked[k]), int(agreement.agreed[k])
     if looked < FEWEST:
         return f"only {looked} points visible to both sensors face along ({direction}) of the target, {agreed} agree"
     return f"of {looked} visible points that face along ({direction}) of the target, only {agreed} agree"
-
-
-def _words(direction: Array) -> str:
-    return " ".join(f"{x:.2f}" for x in np.round(direction, 2) + 0.0)  # no "-0.00"
 
 
 def _unknown(unseen: Mapping[str, str]) -> Iterator[str]:

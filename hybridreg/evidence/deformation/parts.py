@@ -60,7 +60,7 @@ def lying_better(onto: Onto, T: Array, starts: Array, metres: float) -> list[Par
     for k in range(_PARTS):
         part, *weighed = (lot[(ends[k] <= lot @ along) & (lot @ along <= ends[k + 1])] for lot in lots)
         centre = se3.apply(T, part.mean(axis=0, keepdims=True))[0]
-        for to in _laid(onto, starts, part, weighed[0]):
+        for to in laid(onto, starts, part, weighed[0]):
             off = Tolerance.between(T, to, centre)
             if off.metres > metres and off.degrees < _FARTHEST and _better(onto, T, to, weighed):
                 found.append(Part(to, off))
@@ -87,8 +87,9 @@ def _facing(view: View, along: Array) -> Array:
     return points
 
 
-def _laid(onto: Onto, starts: Array, points: Array, fine: Array) -> list[Array]:
-    # Where a part comes to lie from each start, more closely first.
+def laid(onto: Onto, starts: Array, points: Array, fine: Array) -> list[Array]:
+    """Where a part, `points` (n, 3) and as `fine` as the cloud shows it (m, 3), comes to lie from each of some starts
+    (k, 4, 4): on fine surfaces, and after that the rough ones; none where it has few points."""
     if min(len(points), len(fine)) < FEWEST:
         return []
     surfaces, spacing = onto.other_fine, onto.spacing
