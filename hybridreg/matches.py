@@ -147,7 +147,7 @@ class Pose:
         What the estimator knows about T and each of the rivals (`hybridreg.search.hypothesis.Hypothesis`), in that
         order; the verdict need not compute it again. Empty where it knows nothing.
     weighed : object or None
-        What the verdict would weigh, where the estimator has done so (`hybridreg.verdict.judgement.Weighed`).
+        What the verdict would weigh, where the estimator has done so (`hybridreg.verdict.weighing.Weighed`).
     entries : tuple of EntryTrace
         What each entry did, where the estimator tried several.
     """

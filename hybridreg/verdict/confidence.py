@@ -58,7 +58,7 @@ _HARDLY, _FACING = 0.1, 60
 # more than 0.22.
 _FEW, _SOME = 0.25, 30
 # Log-odds by which a rival may be likelier and still count as equal; by hand.
-_EQUAL = 1.0
+EQUAL = 1.0
 # Log-odds from which a rival is told of, however far it lies behind: a map may hold a place twice.
 LIKELY = 0.0
 # Evidence that speaks for a pose the larger it is (+1), or against it (-1); 0 may do either.
@@ -147,7 +147,7 @@ def _one_of_two(told: Mapping[str, float], rule: Boosted) -> bool:
     # "ok" were it not for a rival that explains the clouds about as well: one of the two is right (of 103 such
     # training poses 37 were).
     alone = rule({**told, "rival_margin": NO_RIVAL})
-    return told["rival_margin"] < _EQUAL and alone >= OK_LOG_ODDS
+    return told["rival_margin"] < EQUAL and alone >= OK_LOG_ODDS
 
 
 def believed(log_odds: float, rival_margin: float) -> float:

@@ -22,7 +22,7 @@ from hybridreg.evidence.log_odds import OK
 from hybridreg.frames import lower_pose
 from hybridreg.geometry import se3
 from hybridreg.matches import Pose
-from hybridreg.verdict.judgement import weigh
+from hybridreg.verdict.weighing import weigh
 
 Array = NDArray[np.float64]
 # Degrees and metres, for vehicles' sensors; the first is the true pose.
