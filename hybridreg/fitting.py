@@ -17,7 +17,7 @@ from hybridreg import gate, registry
 from hybridreg.geometry import units
 from hybridreg.geometry.extent import lone, share_within
 from hybridreg.pair import Pair
-from hybridreg.scene import Scene
+from hybridreg.scene import SIDES, Scene
 from hybridreg.slots import SLOTS
 
 if TYPE_CHECKING:
@@ -148,9 +148,25 @@ def check_stage_image(stage: Any, pair: Pair) -> None:
         raise ValueError(f"pair {pair.id}: {_label(stage)} needs an image; pass image=...")
 
 
+def _check_same(pair: Pair, given: Pair) -> None:
+    # What is judged is the pair of the scene: a pose for clouds that a stage has moved is none for those of the user.
+    if pair.drawn:
+        return
+    for name in SIDES:
+        own, its = getattr(given, name), getattr(pair, name)
+        if its is not own and not (
+            np.array_equal(its.points, own.points) and np.array_equal(its.offset, own.offset)
+        ):
+            raise ValueError(
+                f"downsample: the stage gave back a scene with another {name} than the one that it was given; change "
+                "the levels, not the pair: Scene.on_cells(pair, voxel)"
+            )
+
+
 def check_scene(scene: Scene, given: Pair) -> None:
     """Refuse levels that are too small to register; warn of a unit or a voxel that is obviously wrong. `given` is the
     pair before anything was drawn into it: walls hide that its numbers are whole, or degrees."""
+    _check_same(scene.pair, given)
     doubts = units.doubts(given if scene.pair.drawn else scene.pair)
     for name, text in doubts.items():
         _warn(f"{name}: {text}")

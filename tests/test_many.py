@@ -123,6 +123,13 @@ def test_a_batch_against_a_map_goes_on_where_it_was_cut_off(town: Any, folder: P
     assert [json.loads(line) for line in path.read_text().splitlines()[1:4]] == [
         r for r in kept if not r["error"]
     ]
+    # A scan that is another one now is registered anew.
+    (folder / "scans" / "s1.pcd").write_bytes((folder / "scans" / "s2.pcd").read_bytes())
+    assert CliRunner().invoke(app, call).exit_code == 0
+    with open(folder / "out" / "poses.csv", newline="") as file:
+        table = {row["id"]: row for row in csv.DictReader(file)}
+    assert table["s1"]["x"] == table["s2"]["x"]
+    (folder / "scans" / "s1.pcd").unlink()
     other = CliRunner().invoke(app, [*call, "--seed", "1"])
     assert other.exit_code == 2
     assert "--overwrite" in other.stderr

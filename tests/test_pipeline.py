@@ -126,6 +126,27 @@ def test_a_wrong_return_is_told_in_words(
         identity(**{"voxel": None if slot == "downsample" else 0.5, slot: wrong}).run(courtyard[0])
 
 
+def test_a_stage_that_hands_on_other_clouds_is_refused(courtyard: tuple[hr.Pair, np.ndarray]) -> None:
+    # What is judged is the pair of the scene, and a pose for clouds that were moved is none for those that were given.
+    pair = courtyard[0]
+
+    def centred(pair: hr.Pair) -> Scene:
+        source = hr.PointCloud.of(pair.source.points - pair.source.points.mean(axis=0), viewpoint="none")
+        return hr.Scene.on_cells(pair.with_clouds(source, pair.target), 0.5)
+
+    def swapped(pair: hr.Pair) -> Scene:
+        return hr.Scene.on_cells(pair.with_clouds(pair.target, pair.source), 0.5)
+
+    for stage in (centred, swapped):
+        with pytest.raises(ValueError, match="downsample: .* another source than the one that it was given"):
+            identity(voxel=None, downsample=stage).run(pair)
+
+    def same(pair: hr.Pair) -> Scene:
+        return hr.Scene.on_cells(pair, 0.5)
+
+    identity(voxel=None, downsample=same).run(pair)
+
+
 def test_a_probability_out_of_range_is_told(courtyard: tuple[hr.Pair, np.ndarray]) -> None:
     def wild(scene: Scene) -> Overlap:
         return Overlap(np.full(len(scene.source), 2.0), np.ones(len(scene.target)))

@@ -113,6 +113,7 @@ def test_what_was_cut_off_goes_on_to_the_same_poses(
     # A scan that changed is registered anew, the others are not.
     (folder / "s12.pcd").write_bytes((folder / "s12.pcd").read_bytes())  # its time is another
     assert call(folder, tmp_path, *fast).exit_code == 0
+    assert not (tmp_path / "poses.tum.txt").exists()  # of another reference
     assert ran
     assert all(4 in pair for pair in ran)
     done = call(folder, tmp_path, *fast, "--seed", "1")

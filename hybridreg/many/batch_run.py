@@ -20,7 +20,7 @@ from hybridreg.io.csv_cells import csv_text
 from hybridreg.io.line_file import LineFile
 from hybridreg.io.lock import folder_lock
 from hybridreg.many.jobs import Job
-from hybridreg.many.kept_rows import kept
+from hybridreg.many.kept_rows import kept, looks
 from hybridreg.many.target import Target
 from hybridreg.output.pose_text import position_and_quaternion
 from hybridreg.pair import Pair
@@ -61,7 +61,8 @@ def run(
     spoken: Callable[[str], str] = str,
 ) -> list[Row]:
     """Register every pair that the folder does not hold yet: `rows.jsonl` grows as they are done, `poses.csv` is
-    written at the end. Pairs that ended with an `error` are tried again, as their files may have been mended since.
+    written at the end. Pairs that ended with an `error` are tried again, as their files may have been mended since, and
+    so are those of which a file has changed.
 
     Each target is prepared once in each process (`Target`). A pair that cannot be read or registered is a row with its
     `error`, and verdict "failed".
@@ -113,13 +114,23 @@ def _key(job: Job) -> tuple[str, str, str]:
 
 def _read(path: Path, settings: Row) -> dict[tuple[str, str, str], Row]:
     def parse(rows: list[Row]) -> tuple[dict[tuple[str, str, str], Row], int]:
-        return {(row["id"], row["source"], row["target"]): row for row in rows if not row["error"]}, len(rows)
+        good = [row for row in rows if not row["error"] and _unchanged(row)]
+        return {(row["id"], row["source"], row["target"]): row for row in good}, len(rows)
 
     found, n = kept(path, settings, parse) or ({}, 0)
     if len(found) < n:
         lines = (settings, *found.values())
         write_text(path, "".join(json.dumps(each) + "\n" for each in lines))
     return found
+
+
+def _unchanged(row: Row) -> bool:
+    # A file that is gone tells nothing against what was found with it.
+    return all(now in (None, then) for now, then in zip(_looks(row), row["files"], strict=True))
+
+
+def _looks(row: Row) -> list[str | None]:
+    return [looks(file) if os.path.exists(file) else None for file in (row["source"], row["target"])]
 
 
 @lru_cache(maxsize=1)
@@ -142,6 +153,7 @@ def _one(job: Job, settings: str) -> Row:
         "T_target_source": None,
         "error": None,
     }
+    row["files"] = _looks(row)  # before they are read
     told = json.loads(settings)
     try:
         source = PointCloud.of(job.source, name="source", nonfinite=told["nonfinite"])

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, TypeVar
@@ -39,3 +40,9 @@ def kept(path: Path, settings: Mapping[str, Any], parse: Callable[[list[Any]], V
         )
     cut(path, length)
     return found
+
+
+def looks(file: str) -> str:
+    """A file by its name, size and time, by which one that has changed since is told."""
+    told = os.stat(file)
+    return f"{file}, {told.st_size} bytes, {told.st_mtime_ns} ns"

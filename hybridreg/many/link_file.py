@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -12,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from hybridreg.io.line_file import LineFile
-from hybridreg.many.kept_rows import kept
+from hybridreg.many.kept_rows import kept, looks
 from hybridreg.many.link_search import Key
 from hybridreg.many.links import Link
 
@@ -46,7 +45,7 @@ class LinkFile(dict[Key, Link]):
     ) -> None:
         super().__init__()
         self._on_link = on_link
-        self._looks = [_looks(file) for file in files]
+        self._looks = [looks(file) for file in files]
         held = not overwrite and kept(path, settings, self._take)
         self._file = LineFile(path, anew=not held)
         if not held:
@@ -89,8 +88,3 @@ class LinkFile(dict[Key, Link]):
             )
             super().__setitem__((a, b, start), link)
         return True
-
-
-def _looks(file: str) -> str:
-    told = os.stat(file)
-    return f"{file}, {told.st_size} bytes, {told.st_mtime_ns} ns"

@@ -24,7 +24,7 @@ from hybridreg.many.file_patterns import files_named
 from hybridreg.many.link_file import LinkFile
 from hybridreg.many.link_search import aligned
 from hybridreg.output.pose_files import pose_files
-from hybridreg.output.pose_text import position_and_quaternion
+from hybridreg.output.pose_text import FORMATS, position_and_quaternion
 
 WRITTEN = _LINKS, _TABLE, _ROLES, _ALL = "links.jsonl", "poses.csv", "links.csv", "alignment.json"
 
@@ -115,8 +115,9 @@ def run(
         write_text(folder / _TABLE, _table(found, files))
         write_text(folder / _ROLES, _roles(found))
         write_json(folder / _ALL, found.to_dict())
-        # A cloud that an earlier run placed may not be placed now.
-        for stale in (folder / "poses").glob("*.txt"):
+        # A cloud that an earlier run placed may not be placed now, and poses in another form are of that run.
+        forms = (path for each in FORMATS for path in folder.glob(f"poses.{each}*"))
+        for stale in (*(folder / "poses").glob("*.txt"), *forms):
             stale.unlink()
         for name, text in pose_files(names, found.poses, row, form).items():
             (folder / name).parent.mkdir(exist_ok=True)
