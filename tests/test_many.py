@@ -106,6 +106,7 @@ def test_a_batch_against_a_map_goes_on_where_it_was_cut_off(town: Any, folder: P
     with open(folder / "out" / "poses.csv", newline="") as file:
         table = {row["id"]: row for row in csv.DictReader(file)}
     assert table["bad"]["x"] == ""
+    assert [table[name]["scale"] for name in ("bad", "s0")] == ["", "1"]
     assert "bad.pcd" in table["bad"]["why"]
     for k in range(3):
         assert np.allclose([float(table[f"s{k}"][axis]) for axis in "xyz"], poses[k][:3, 3], atol=0.1)

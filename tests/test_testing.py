@@ -59,6 +59,19 @@ class Careless(Stage):
         return Correspondences(source=scene.source.points[rows], target=target, weight=weight)
 
 
+@dataclass(frozen=True, kw_only=True)
+class Swapping(Stage):
+    """Hands on another pair than the one that it was given."""
+
+    def __call__(self, pair: Pair) -> Scene:
+        return Scene.on_cells(pair.with_clouds(pair.target, pair.source), 0.5)
+
+
+def test_a_downsample_stage_must_hand_on_the_pair() -> None:
+    with pytest.raises(AssertionError, match="source: the pair of the scene is another one"):
+        testing.check_stage(Swapping(), "downsample")
+
+
 def test_a_careful_one_passes() -> None:
     testing.check_stage(Careless(), "match")
 

@@ -42,6 +42,7 @@ _COLUMNS = (
     "qy",
     "qz",
     "qw",
+    "scale",
     "seconds",
     "why",
 )
@@ -182,7 +183,7 @@ def _table(rows: Sequence[Row], spoken: Callable[[str], str]) -> str:
     lines: list[Sequence[str]] = [_COLUMNS]
     for row in rows:
         T = row["T_target_source"]
-        pose = [""] * 7 if T is None else position_and_quaternion(np.array(T))
+        pose = [""] * 8 if T is None else [*position_and_quaternion(np.array(T)), f"{row['scale']:.6g}"]
         why = spoken(row["error"] or "; ".join(row["reasons"]))
         told = (row["id"], row["source"], row["target"], row["verdict"], f"{row['confidence']:.3f}")
         lines.append((*told, *pose, f"{row['seconds']:.3f}", why))
