@@ -54,6 +54,19 @@ def start_processes(devices: int, accelerator: str, precision: Literal["32-true"
     return fabric
 
 
+def in_a_group() -> bool:
+    """Whether this process belongs to a group of processes already."""
+    return torch.distributed.is_available() and torch.distributed.is_initialized()
+
+
+def leave_group() -> None:
+    """Leave the group of processes, once all are done. Fabric leaves gloo's to the end of the interpreter, which its
+    threads may abort (torch 2.13.0, seen once)."""
+    if in_a_group():
+        torch.distributed.barrier()
+        torch.distributed.destroy_process_group()
+
+
 def _check_accelerator(accelerator: str) -> None:
     here = {"cuda": torch.cuda.is_available(), "mps": torch.backends.mps.is_available()}
     if not {**here, "gpu": any(here.values())}.get(accelerator, True):

@@ -25,7 +25,7 @@ from hybridreg.learned.training.data.preparing import prepare_all
 from hybridreg.learned.training.data.training_examples import open_examples
 from hybridreg.learned.training.initial_weights import first_network
 from hybridreg.learned.training.loop import CHECKPOINT, Loop, count_parameters
-from hybridreg.learned.training.processes import start_processes
+from hybridreg.learned.training.processes import in_a_group, leave_group, start_processes
 from hybridreg.learned.training.recipe import Recipe, Source
 from hybridreg.learned.training.record import Record
 from hybridreg.learned.training.reporting import Reporter
@@ -79,12 +79,16 @@ def train(recipe: Recipe, options: RunOptions, flag: StopFlag | None = None) -> 
     require_data(recipe)
     before = _before(recipe, options)
     parent = os.getppid()
+    callers = in_a_group()
     fabric = start_processes(options.devices, options.accelerator, recipe.precision)
     if not fabric.is_global_zero or "TORCHELASTIC_RUN_ID" in os.environ:
         end_with(parent)  # otherwise it would wait for the others for hours
     options.out.mkdir(parents=True, exist_ok=True)
     with folder_lock(options.out) if fabric.is_global_zero else nullcontext():
-        return _train(recipe, options, before, fabric, flag)
+        result = _train(recipe, options, before, fabric, flag)
+    if not callers:
+        leave_group()
+    return result
 
 
 def _train(

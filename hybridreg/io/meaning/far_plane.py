@@ -13,9 +13,8 @@ Array = NDArray[np.float64]
 _FEWEST, _LEAST = 20, 0.01  # points in the plane, and their share
 _SAME = 1e-5  # of its distance, by which two that are the same may differ: single precision, digits of a text
 _NEARER = 0.5  # of its distance; what was seen lies nearer
-_ASIDE = (
-    2.5  # times the distance ahead; no pinhole camera sees what is more aside, as a LiDAR above a floor does
-)
+# Times the distance ahead; no pinhole camera sees what is more aside, as a LiDAR above a floor does.
+_ASIDE = 2.5
 
 
 def far_plane(points: Array) -> str | None:
@@ -39,14 +38,13 @@ def far_plane(points: Array) -> str | None:
 def _plane(points: Array) -> tuple[str, float, int] | None:
     low, high = points.min(axis=0), points.max(axis=0)
     for k in range(3):
-        if (
-            not low[k] * high[k] > 0.0
-        ):  # a camera sees what is ahead; missing returns, (0, 0, 0), were told before
+        # A camera sees what is ahead; missing returns, (0, 0, 0), were told before.
+        if low[k] <= 0.0 <= high[k]:
             continue
         far = float(high[k] if high[k] > 0.0 else low[k])
         depth = points[:, k] / far
         there = depth >= 1.0 - _SAME
-        if (np.abs(np.delete(points, k, axis=1)).max(axis=1) > _ASIDE * np.abs(points[:, k])).any():
+        if (np.abs(np.delete(points, k, axis=1)).max(axis=1) / _ASIDE > np.abs(points[:, k])).any():
             continue
         count = int(np.count_nonzero(there))
         if max(_FEWEST, _LEAST * len(points)) <= count < len(points) and depth[~there].max() < _NEARER:
