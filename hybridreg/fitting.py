@@ -12,6 +12,7 @@ from numbers import Integral, Real
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hybridreg import gate, registry
 from hybridreg.geometry import units
@@ -148,25 +149,38 @@ def check_stage_image(stage: Any, pair: Pair) -> None:
         raise ValueError(f"pair {pair.id}: {_label(stage)} needs an image; pass image=...")
 
 
-def _check_same(pair: Pair, given: Pair) -> None:
+def _check_same(scene: Scene, given: Pair) -> None:
     # What is judged is the pair of the scene: a pose for clouds that a stage has moved is none for those of the user.
-    if pair.drawn:
+    # Its clouds may hold fewer points, and means of several.
+    if scene.pair.drawn:
         return
     for name in SIDES:
-        own, its = getattr(given, name), getattr(pair, name)
-        if its is not own and not (
-            np.array_equal(its.points, own.points) and np.array_equal(its.offset, own.offset)
-        ):
+        own, its, reach = getattr(given, name), getattr(scene.pair, name), scene.level(name).spacing
+        if its is own or np.array_equal(its.points, own.points):
+            continue
+        rows = {
+            *its.points.argmin(axis=0),
+            *its.points.argmax(axis=0),
+            *range(0, len(its), len(its) // 6 + 1),
+        }
+        same_frame = np.array_equal(its.offset, own.offset)
+        if not (same_frame and all(_has(own.points, its.points[row], reach) for row in rows)):
             raise ValueError(
                 f"downsample: the stage gave back a scene with another {name} than the one that it was given; change "
                 "the levels, not the pair: Scene.on_cells(pair, voxel)"
             )
 
 
+def _has(points: NDArray[np.float64], place: NDArray[np.float64], reach: float) -> bool:
+    # Whether one of many points lies near a place, within some metres along each axis.
+    beside = points[np.abs(points[:, 0] - place[0]) <= reach]
+    return bool((np.abs(beside - place) <= reach).all(axis=1).any())
+
+
 def check_scene(scene: Scene, given: Pair) -> None:
     """Refuse levels that are too small to register; warn of a unit or a voxel that is obviously wrong. `given` is the
     pair before anything was drawn into it: walls hide that its numbers are whole, or degrees."""
-    _check_same(scene.pair, given)
+    _check_same(scene, given)
     doubts = units.doubts(given if scene.pair.drawn else scene.pair)
     for name, text in doubts.items():
         _warn(f"{name}: {text}")
