@@ -18,7 +18,7 @@ from hybridreg import gate, registry
 from hybridreg.geometry import units
 from hybridreg.geometry.extent import lone, share_within
 from hybridreg.pair import Pair
-from hybridreg.scene import SIDES, Scene
+from hybridreg.scene import SIDES, Scene, Side
 from hybridreg.slots import SLOTS
 
 if TYPE_CHECKING:
@@ -149,11 +149,14 @@ def check_stage_image(stage: Any, pair: Pair) -> None:
         raise ValueError(f"pair {pair.id}: {_label(stage)} needs an image; pass image=...")
 
 
-def _check_same(scene: Scene, given: Pair) -> None:
-    # What is judged is the pair of the scene: a pose for clouds that a stage has moved is none for those of the user.
-    # Its clouds may hold fewer points, and means of several.
+def changed(scene: Scene, given: Pair) -> Side | None:
+    """Which cloud of the scene's pair is another one than was given, if any; it may hold fewer points, or means of
+    several, and walls that were drawn into it.
+
+    What is judged is that pair: a pose for clouds that a stage has moved is none for those of the user.
+    """
     if scene.pair.drawn:
-        return
+        return None
     for name in SIDES:
         own, its, reach = getattr(given, name), getattr(scene.pair, name), scene.level(name).spacing
         if its is own or np.array_equal(its.points, own.points):
@@ -165,10 +168,8 @@ def _check_same(scene: Scene, given: Pair) -> None:
         }
         same_frame = np.array_equal(its.offset, own.offset)
         if not (same_frame and all(_has(own.points, its.points[row], reach) for row in rows)):
-            raise ValueError(
-                f"downsample: the stage gave back a scene with another {name} than the one that it was given; change "
-                "the levels, not the pair: Scene.on_cells(pair, voxel)"
-            )
+            return name
+    return None
 
 
 def _has(points: NDArray[np.float64], place: NDArray[np.float64], reach: float) -> bool:
@@ -180,7 +181,12 @@ def _has(points: NDArray[np.float64], place: NDArray[np.float64], reach: float) 
 def check_scene(scene: Scene, given: Pair) -> None:
     """Refuse levels that are too small to register; warn of a unit or a voxel that is obviously wrong. `given` is the
     pair before anything was drawn into it: walls hide that its numbers are whole, or degrees."""
-    _check_same(scene, given)
+    other = changed(scene, given)
+    if other:
+        raise ValueError(
+            f"downsample: the stage gave back a scene with another {other} than the one that it was given; change "
+            "the levels, not the pair: Scene.on_cells(pair, voxel)"
+        )
     doubts = units.doubts(given if scene.pair.drawn else scene.pair)
     for name, text in doubts.items():
         _warn(f"{name}: {text}")

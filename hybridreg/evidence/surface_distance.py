@@ -94,6 +94,13 @@ class Surfaces:
             self._known[new] = True
         return self._normals[rows]
 
+    def across(self, points: Array) -> tuple[NDArray[np.bool_], Array]:
+        """Which of some points (n, 3) have a partner, and their signed distances (k,) to the partners' planes."""
+        distance, match = self.tree.query(points, distance_upper_bound=self.far)
+        near = np.isfinite(distance)
+        row = match[near]
+        return near, np.einsum("ni,ni->n", points[near] - self.points[row], self.facing(row))
+
     def near(self, points: Array) -> NDArray[np.bool_]:
         """Which of some points (n, 3) have a partner."""
         return np.isfinite(self.tree.query(points, distance_upper_bound=self.far)[0])
@@ -161,11 +168,7 @@ def _surfaces(cloud: PointCloud, scale: float) -> Surfaces:
 def one_way(asked: Array, other: Surfaces, T_other_asked: Array) -> float:
     """The same of points (m, 3) of one cloud on the surfaces of the other."""
     far, noise = other.far, other.noise
-    moved = se3.apply(T_other_asked, asked)
-    distance, match = other.tree.query(moved, distance_upper_bound=far)
-    near = np.isfinite(distance)
-    row = match[near]
-    across = np.einsum("ni,ni->n", moved[near] - other.points[row], other.facing(row))
+    _, across = other.across(se3.apply(T_other_asked, asked))
     # Of distances up to the farthest: a half-normal one of the noise, or any.
     on_it = np.sqrt(2.0 / np.pi) / noise * np.exp(-0.5 * (across / noise) ** 2)
     nats = np.log((1.0 - _ANYWHERE) * on_it * far + _ANYWHERE)

@@ -68,10 +68,8 @@ def _of(side: Side, onto: Onto, T: Array, allowed: Tolerance) -> SecondLayer | N
     away = Tolerance.between(T, to, se3.apply(T, off.mean(axis=0, keepdims=True))[0])
     if away.within(allowed) or away.degrees > _FARTHEST:
         return None
-    first, second = (
-        np.count_nonzero(~lies_off),
-        np.count_nonzero(_gaps(off, surfaces, to) < _ON * surfaces.noise),
-    )
+    first = np.count_nonzero(~lies_off)
+    second = np.count_nonzero(_gaps(off, surfaces, to) < _ON * surfaces.noise)
     if first < _AS_MANY * second or second < _LIES * len(off):
         return None
     if one_way(off, surfaces, to) - one_way(off, surfaces, T) < _GAIN:
@@ -87,10 +85,7 @@ def _standing(onto: Onto) -> Array:
 
 def _gaps(points: Array, surfaces: Surfaces, T: Array) -> Array:
     # Distances (n,) of points (n, 3) to the planes of their partners; infinite where there is none.
-    moved = se3.apply(T, points)
-    distance, match = surfaces.tree.query(moved, distance_upper_bound=surfaces.far)
-    near = np.isfinite(distance)
+    near, across = surfaces.across(se3.apply(T, points))
     gaps = np.full(len(points), np.inf)
-    row = match[near]
-    gaps[near] = np.abs(np.einsum("ni,ni->n", moved[near] - surfaces.points[row], surfaces.facing(row)))
+    gaps[near] = np.abs(across)
     return gaps

@@ -78,12 +78,12 @@ def are_channels(numbers: Numbers, width: int, contrast: Contrast) -> bool:
 
 
 def refuse_other_types(data: bytes, name: str) -> None:
-    """Refuse numbers that are no float32: whole ones, of which floats are zeros or no numbers, and times in front.
+    """Refuse numbers that are no float32: whole ones, of which floats are zeros or no numbers.
 
     Raises
     ------
     ValueError
-        They are int32, int64 or smaller whole numbers, or records that begin with a time of eight bytes.
+        They are int32, int64 or smaller whole numbers.
     """
     count = len(data) // 4
     whole = np.frombuffer(data, dtype="<i4", count=count)
