@@ -15,17 +15,17 @@ from hybridreg.evidence.deformation import (
     bend,
     heights,
     motion_distortion,
-    range_offset,
     scale,
     second_layer,
+    sensor_offset,
     stretch,
 )
 from hybridreg.evidence.deformation.bend import Bend
 from hybridreg.evidence.deformation.deformed import Deformed, Onto, closeness_of
 from hybridreg.evidence.deformation.motion_distortion import MotionDistortion
-from hybridreg.evidence.deformation.range_offset import RangeOffset
 from hybridreg.evidence.deformation.scale import Size
 from hybridreg.evidence.deformation.second_layer import SecondLayer
+from hybridreg.evidence.deformation.sensor_offset import SensorOffset
 from hybridreg.evidence.deformation.stretch import Stretch
 from hybridreg.evidence.evidence import Evidence
 from hybridreg.evidence.information import Information
@@ -69,15 +69,16 @@ class PoseEvidence:
         return scale.size(self.views, self.T, self.closeness, self._explained)
 
     @cached_property
-    def range_offset(self) -> RangeOffset | None:
-        """The offset of the source's ranges at which it fits better."""
-        return range_offset.range_offset(self.views, self.T)
+    def sensor_offset(self) -> SensorOffset | None:
+        """The offset of one sensor's ranges and elevations at which its cloud fits better."""
+        return sensor_offset.sensor_offset(self.views, self.T)
 
     @cached_property
     def stretch(self) -> Stretch | None:
         """How the source must be stretched to fit better, if it must."""
         along = stretch.stretch(self.views, self.T, self.closeness, self._explained)
-        return along or heights.heights(self.views, self.T)
+        off = self.sensor_offset is not None and self.sensor_offset.told
+        return along if along or off else heights.heights(self.views, self.T)
 
     @cached_property
     def motion_distortion(self) -> MotionDistortion | None:
@@ -95,9 +96,9 @@ class PoseEvidence:
         return second_layer.second_layer(self.views, self.T)
 
     def _explained(self, fitted: Array) -> bool:
-        # Whether an offset of the ranges, or a sensor's motion, lets the clouds lie more closely than another
+        # Whether a sensor's offset, or its motion, lets the clouds lie more closely than another
         # deformation (4, 4), affine: nothing is strained then.
-        offset, motion = self.range_offset, self.motion_distortion
+        offset, motion = self.sensor_offset, self.motion_distortion
         strained = closeness_of(Onto.target(self.views), Deformed(fitted))
         if offset is not None and offset.close >= strained:
             return True

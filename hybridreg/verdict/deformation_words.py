@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from hybridreg.evidence.deformation.bend import Bend
 from hybridreg.evidence.deformation.motion_distortion import MotionDistortion
-from hybridreg.evidence.deformation.range_offset import RangeOffset
 from hybridreg.evidence.deformation.second_layer import SecondLayer
+from hybridreg.evidence.deformation.sensor_offset import SensorOffset
 from hybridreg.evidence.deformation.stretch import Stretch
 from hybridreg.evidence.evidence import Evidence
 from hybridreg.verdict.confidence import SIZE_GAIN
@@ -23,7 +23,7 @@ Array = NDArray[np.float64]
 def of_deformed_clouds(evidence: Evidence, doubts: Doubts) -> Iterator[str]:
     """In sentences: how a cloud is deformed, or held twice, and what to do."""
     yield from _strained(evidence, doubts.stretch)
-    yield from _off_in_range(doubts.range_offset)
+    yield from _off(doubts.sensor_offset)
     yield from _in_motion(doubts.motion_distortion)
     yield from _bent(doubts.bend)
     yield from _twice(doubts.second_layer)
@@ -49,14 +49,23 @@ def _strained(evidence: Evidence, stretch: Stretch | None) -> Iterator[str]:
         )
 
 
-def _off_in_range(offset: RangeOffset | None) -> Iterator[str]:
-    if offset is not None:
-        than = "longer" if offset.metres > 0.0 else "shorter"
-        harm = ", and the pose moves by more than the tolerance then" if offset.beyond else ""
-        yield (
-            f"the source fits better when all its ranges are {abs(offset.metres):.2f} m {than}{harm}: is the range "
-            "offset of one of the sensors calibrated?"
+def _off(offset: SensorOffset | None) -> Iterator[str]:
+    if offset is None:
+        return
+    amounts = []
+    if offset.in_range:
+        amounts.append(
+            f"ranges are {abs(offset.metres):.2f} m {'longer' if offset.metres > 0.0 else 'shorter'}"
         )
+    if offset.in_elevation:
+        amounts.append(
+            f"elevations are {abs(offset.degrees):.1f} deg {'higher' if offset.degrees > 0.0 else 'lower'}"
+        )
+    harm = ", and the pose moves by more than the tolerance then" if offset.beyond else ""
+    yield (
+        f"the {offset.side} fits better when all its {' and all its '.join(amounts)}{harm}: is one of the sensors "
+        "calibrated badly?"
+    )
 
 
 def _in_motion(motion: MotionDistortion | None) -> Iterator[str]:

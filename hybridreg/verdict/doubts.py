@@ -12,8 +12,8 @@ from hybridreg.evidence import corner, lone_thing, silhouette
 from hybridreg.evidence.covariance import of_information
 from hybridreg.evidence.deformation.bend import Bend
 from hybridreg.evidence.deformation.motion_distortion import MotionDistortion
-from hybridreg.evidence.deformation.range_offset import RangeOffset
 from hybridreg.evidence.deformation.second_layer import SecondLayer
+from hybridreg.evidence.deformation.sensor_offset import SensorOffset
 from hybridreg.evidence.deformation.stretch import Stretch
 from hybridreg.evidence.evidence import Evidence
 from hybridreg.evidence.log_odds import FAILED
@@ -60,8 +60,9 @@ class Doubts:
         Rivals that little contradicts, where by the pose both clouds were seen from one place.
     stretch : Stretch or None
         How the source fits better.
-    range_offset : RangeOffset or None
-        The offset of its ranges at which it fits clearly better; no doubt where that lies within the tolerance.
+    sensor_offset : SensorOffset or None
+        What added to a sensor's ranges or elevations makes its cloud fit clearly better; no doubt where the pose lies
+        within the tolerance all the same.
     motion_distortion : MotionDistortion or None
         How a sensor moved while it measured; no doubt where the pose lies within the tolerance.
     bend : Bend or None
@@ -82,7 +83,7 @@ class Doubts:
     corner: bool = False
     one_place: Rivalled | None = None
     stretch: Stretch | None = None
-    range_offset: RangeOffset | None = None
+    sensor_offset: SensorOffset | None = None
     motion_distortion: MotionDistortion | None = None
     bend: Bend | None = None
     second_layer: SecondLayer | None = None
@@ -102,7 +103,7 @@ class Doubts:
     @property
     def about_source(self) -> bool:
         """Whether a cloud is deformed, so that no pose is right."""
-        known = (self.range_offset, self.motion_distortion)
+        known = (self.sensor_offset, self.motion_distortion)
         beyond = any(one is not None and one.beyond for one in known)
         found = any(each is not None for each in (self.stretch, self.bend, self.second_layer))
         return found or beyond
@@ -110,7 +111,7 @@ class Doubts:
     def of_pose(self) -> Doubts:
         """Those that are not about a deformed cloud."""
         return replace(
-            self, stretch=None, range_offset=None, motion_distortion=None, bend=None, second_layer=None
+            self, stretch=None, sensor_offset=None, motion_distortion=None, bend=None, second_layer=None
         )
 
     @classmethod
@@ -126,7 +127,7 @@ class Doubts:
         )
         if not likely:
             return quick
-        opposite, offset, motion = lone_thing.opposite(scene, at), at.range_offset, at.motion_distortion
+        opposite, offset, motion = lone_thing.opposite(scene, at), at.sensor_offset, at.motion_distortion
         strained = at.stretch is not None or evidence.size_gain > SIZE_GAIN
         offset = offset if offset is not None and offset.told and not strained else None
         moved = None if strained or (offset and motion and not motion.explains(offset.close)) else motion
@@ -137,7 +138,7 @@ class Doubts:
             one_place=rivalled(at, found),
             corner=corner.bare_corner(at) and corner.others_allowed(scene.pair, at),
             stretch=at.stretch,
-            range_offset=None if moved else offset,
+            sensor_offset=None if moved else offset,
             motion_distortion=moved,
             bend=None if strained else at.bend,
             second_layer=None if strained else at.second_layer,

@@ -119,31 +119,3 @@ def test_heights_of_a_hall_are_told_by_its_level_surfaces(real_data: Path, facto
     assert result.verdict != "ok"
     found = PoseEvidence(views.of(VoxelGrid()(made.pair)), made.T_target_source)
     assert heights(found.views, found.T) is None
-
-
-@pytest.mark.parametrize("metres", [1.0, 0.5, -0.5, 0.3])
-@pytest.mark.parametrize("name", ["kitti-city-20-to-0", "opencalib-hesai1-qt202-to-p64"])
-def test_an_offset_of_all_ranges_is_measured(real_data: Path, name: str, metres: float) -> None:
-    found = real_evidence(
-        real_data / name, lambda p: p * (1.0 + metres / np.linalg.norm(p, axis=1, keepdims=True))
-    ).range_offset
-    assert found is not None
-    assert found.metres == pytest.approx(-metres, abs=0.06)
-
-
-def test_a_pose_that_an_offset_moves_beyond_the_tolerance_is_not_ok(real_data: Path) -> None:
-    made = load_pair(real_data / "kitti-city-20-to-0")
-    source = made.pair.source.points
-    source = source * (1.0 + 1.0 / np.linalg.norm(source, axis=1, keepdims=True))
-    result = hr.register(source, made.pair.target.points)
-    assert result.verdict == "doubtful"
-    assert len(result.entries) == 1, "no pose of such a source is right: the search ends"
-    assert any("all its ranges are 1.0" in reason and "m shorter" in reason for reason in result.reasons)
-
-
-def test_what_is_right_has_no_offset(crossing: Made, fan: Made, corridor: Made) -> None:
-    for made in (crossing, fan, corridor):
-        found = evidence(made, np.eye(3)).range_offset
-        assert found is not None
-        assert not found.told
-        assert not found.beyond
