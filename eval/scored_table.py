@@ -8,7 +8,7 @@ from typing import Any
 
 from hybridreg.config.number_of import number_of
 from hybridreg.eval.run.row import Row
-from hybridreg.eval.score import scoring
+from hybridreg.eval.score import doubted_truths, scoring
 from hybridreg.eval.score.paper import Printed
 from hybridreg.eval.score.protocols import Protocol
 
@@ -59,6 +59,7 @@ class Table:
             *without,
             *self._unread(),
             *self._own_grids(),
+            *doubted_truths.remarks([row for entry in self.methods for row in entry.rows]),
         ]
 
     def _unread(self) -> list[str]:

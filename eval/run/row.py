@@ -46,6 +46,7 @@ class Row:
     T_true : 4x4 or None
         None where the pair itself could not be read.
     overlap : share of source points with a target point within `overlap_radius` metres under the true pose
+    overlap_found : the same share under the pose found, where there is one
     moments : 4x4
         Second moments of those source points (`metrics.second_moments`).
     inlier_ratio : share of right matches by radius in metres, as text, before the matcher's filters
@@ -72,6 +73,7 @@ class Row:
     offsets: dict[str, list[float]] | None = None
     overlap: float | None = None
     overlap_radius: float | None = None
+    overlap_found: float | None = None
     moments: Matrix | None = None
     inlier_ratio: dict[str, float] | None = None
     inlier_ratio_filtered: dict[str, float] | None = None

@@ -42,7 +42,7 @@ def row(index: int, labelled: LabelledPair, tried: Attempt, match: Any = None) -
         T_true=_lowered(labelled.T_target_source, pair),
         offsets=_offsets(pair),
         **_judged(tried),
-        **_overlap(labelled),
+        **_overlap(labelled, tried.T),
         **_matched(tried.matches, _before_filters(tried.trace, match), labelled),
         mask=None if tried.trace is None else _mask(tried.trace, labelled, cut),
         mask_threshold=cut,
@@ -105,18 +105,30 @@ def _level_sizes(trace: Trace | None) -> dict[str, int]:
     return {"source_level": len(trace.scene.source), "target_level": len(trace.scene.target)}
 
 
-def _overlap(labelled: LabelledPair) -> dict[str, Any]:
+def _overlap(labelled: LabelledPair, found: Any) -> dict[str, Any]:
     # The radius comes from the clouds alone, so that every method is measured on the same points.
     pair = labelled.pair
     radius = default_voxel(pair.source, pair.target)
     sample = pair.source.points[:: max(1, len(pair.source) // _SAMPLE)]
-    moved = se3.apply(lower_pose(labelled.T_target_source, pair), sample)
-    common = sample[near(moved, pair.target.points, radius)]
+    true, own = se3.apply(lower_pose(labelled.T_target_source, pair), sample), _moved(found, sample, pair)
+    both = true if own is None else np.concatenate([true, own])
+    hit = near(both, pair.target.points, radius).reshape(-1, len(sample))
+    common = sample[hit[0]]
     return {
+        "overlap_found": None if own is None else float(hit[1].mean()),
         "overlap": len(common) / len(sample),
         "overlap_radius": radius,
         "moments": matrix(metrics.second_moments(common)),
     }
+
+
+def _moved(T: Any, points: metrics.Array, pair: Pair) -> metrics.Array | None:
+    # None for what is no pose, or one of absurd numbers.
+    if matrix(T) is None:
+        return None
+    with np.errstate(over="ignore", invalid="ignore"):
+        moved = se3.apply(lower_pose(np.asarray(T, dtype=np.float64), pair), points)
+    return moved if np.isfinite(moved).all() else None
 
 
 def _matched(

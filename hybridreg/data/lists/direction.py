@@ -70,8 +70,8 @@ class Direction:
             float(inverted.mean()),
             len(both),
             radius,
-            int(_far_better(given, inverted).sum()),
-            int(_far_better(inverted, given).sum()),
+            int(far_better(given, inverted).sum()),
+            int(far_better(inverted, given).sum()),
         )
 
     @property
@@ -117,7 +117,8 @@ def measured(pairs: Readable, n: int = PAIRS) -> Direction:
     return Direction.of(both, radius)
 
 
-def _far_better(one: Array, other: Array) -> NDArray[np.bool_]:
+def far_better(one: Array, other: Array) -> NDArray[np.bool_]:
+    """Which poses cover far more of the source than others, by their overlaps."""
     return np.asarray((one >= _TIMES * other) & (one >= other + _MORE))
 
 
@@ -127,7 +128,7 @@ def check(pairs: Readable, name: str, cure: str, *, n: int = PAIRS, clearly: boo
     Parameters
     ----------
     n : pairs to read
-    clearly : only where most pairs fit far better that way, and without a warning where neither fits
+    clearly : only where most pairs fit far better that way
 
     Raises
     ------
@@ -142,9 +143,11 @@ def check(pairs: Readable, name: str, cure: str, *, n: int = PAIRS, clearly: boo
     found = measured(pairs, n)
     if found.is_clearly_inverted if clearly else found.is_inverted:
         raise WrongDirection(f"{name}: {found}; the poses seem to map target to source, {cure}")
-    if found.as_given < _HARDLY and not clearly:
+    if found.as_given < _HARDLY:
         warnings.warn(
-            f"{name}: {found}; the clouds hardly overlap, are the poses theirs?", UserWarning, stacklevel=3
+            f"{name}: {found}; the clouds hardly overlap: are the poses theirs, and in metres?",
+            UserWarning,
+            stacklevel=3,
         )
 
 
