@@ -58,7 +58,19 @@ _ELSEWHERE = {
         (".fls", ".zfs", ".rxp", ".rcs", ".rdbx", ".lsproj", ".tzf", ".imp", ".ptg"),
         "export it as .e57 with the scanner's own program",
     ),
-    **dict.fromkeys((".tif", ".tiff"), "if it holds heights: gdal_translate -of XYZ IN out.xyz"),
+    **dict.fromkeys(
+        (".tif", ".tiff", ".dem", ".hgt", ".dt0", ".dt1", ".dt2", ".img", ".vrt", ".jp2"),
+        "if it holds heights: gdal_translate -of XYZ IN out.xyz, of degrees after gdalwarp -t_srs EPSG:CODE IN OUT",
+    ),
+    **dict.fromkeys(
+        (".all", ".kmall", ".gsf", ".s7k", ".xtf"),
+        "export its soundings as text: easting, northing and height in metres",
+    ),
+    **dict.fromkeys(
+        (".ifc", ".rvt", ".skp", ".dwg", ".dxf", ".3dm", ".step", ".stp", ".iges", ".igs")
+        + (".fbx", ".dae", ".blend", ".wrl", ".x3d", ".3ds", ".usd", ".usda", ".usdc", ".usdz"),
+        "export its surface as .ply or .obj, in metres, from the program that made it",
+    ),
     # Mostly in degrees, GeoJSON and KML always.
     **dict.fromkeys(
         (".gpkg", ".shp", ".geojson", ".gml", ".kml", ".kmz", ".fgb"),

@@ -140,8 +140,8 @@ def _upside_down(evidence: Evidence) -> Iterator[str]:
     if evidence.overturned:
         yield (
             "the pose turns the world upside down, or puts a sensor below the other cloud's ground; if a cloud may be "
-            'upside down, say so: gravity="unknown" (--gravity unknown); if no sensor stood at its origin, as in a map: '
-            'source_viewpoint="none" or target_viewpoint="none" (--source-viewpoint none)'
+            'upside down, say so: gravity="unknown" (--gravity unknown); if no sensor stood at its origin, as in a '
+            'map: source_viewpoint="none" or target_viewpoint="none" (--source-viewpoint none)'
         )
 
 

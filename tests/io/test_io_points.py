@@ -145,6 +145,9 @@ def test_text_under_every_ending(cloud, ending):
         ("a.pcap", b"\xd4\xc3\xb2\xa1", "sensor's own tool"),
         ("a.mat", b"MATLAB 5.0", "save the array"),
         ("a.csv.gz", b"\x1f\x8b\x08", "unpack it first"),
+        ("a.hgt", b"\x00\x01", "gdalwarp"),
+        ("a.kmall", b"#IIP", "soundings as text"),
+        ("a.ifc", b"ISO-10303-21;", "surface as .ply or .obj"),
         ("a.db3.zstd", b"\x28\xb5\x2f\xfd", "of a ROS 2 bag give the folder"),
     ],
 )
