@@ -64,11 +64,13 @@ class Table:
 
     def _unread(self) -> list[str]:
         rows = max((entry.rows for entry in self.entries), key=len, default=[])
-        n = sum(row.T_true is None for row in rows)
-        if not n:
+        unread = [row for row in rows if row.T_true is None]
+        if not unread:
             return []
+        first = f"; the first, {unread[0].id}: {unread[0].error}" if unread[0].error else ""
         return [
-            f"{n} of {number_of(len(rows), 'pair')} could not be read: against the recall, in no other number"
+            f"{len(unread)} of {number_of(len(rows), 'pair')} could not be read: against the recall, in no other "
+            f"number{first}"
         ]
 
     def failure(self) -> str:

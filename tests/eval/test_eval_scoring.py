@@ -69,7 +69,10 @@ def test_a_pair_that_could_not_be_read_counts_against_recall_only() -> None:
     assert s.rre_deg_all == pytest.approx(1.0)
     entries = [Entry(name="m", rows=[row(0, 1.0, 0.1), lost])]
     (told,) = Table(title="t", data="d", seed=0, starts=0, entries=entries).remarks()
-    assert told == "1 of 2 pairs could not be read: against the recall, in no other number"
+    assert told == (
+        "1 of 2 pairs could not be read: against the recall, in no other number; the first, "
+        f"{lost.id}: OSError: gone"
+    )
 
 
 def test_success_is_strict() -> None:
