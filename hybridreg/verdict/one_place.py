@@ -14,6 +14,7 @@ from hybridreg.evidence.pose_evidence import PoseEvidence
 from hybridreg.geometry import se3
 from hybridreg.resolution import Tolerance
 from hybridreg.search.hypothesis import Hypothesis
+from hybridreg.verdict.confidence import LIKELY
 
 # Of a rival: points off the commonest surface that agree, at least; those that are seen through, as a share of these
 # and of the visible, and of all that are visible, at most; nats per point closer than by chance, at least. By hand: of
@@ -22,7 +23,7 @@ _AGREE, _OF_AGREEING, _OF_RARE, _OF_ALL, _CLOSELY = 60, 0.65, 0.15, 0.1, 0.4
 
 
 class Rivalled(NamedTuple):
-    """The `rivals` of such a pose that little contradicts, and how far the nearest of them lies."""
+    """The `rivals` of such a pose that are likely, or that little contradicts, and how far the nearest of them lies."""
 
     rivals: list[Hypothesis]
     nearest: Tolerance
@@ -32,7 +33,7 @@ def rivalled(at: PoseEvidence, found: list[Hypothesis]) -> Rivalled | None:
     """None where no rival counts, or the pose does not let both clouds be seen from one place."""
     if not at.views.from_one_place(at.T):
         return None
-    counts = [one for one in found if _uncontradicted(one.at)]
+    counts = [one for one in found if one.by_surfaces > LIKELY or _uncontradicted(one.at)]
     if not counts:
         return None
     centre = se3.apply(at.T, at.views.middle)[0]
