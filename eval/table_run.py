@@ -58,7 +58,7 @@ class _MadeFrom:
 
 @dataclass(frozen=True, kw_only=True)
 class _Made:
-    """What must agree between files of predictions in one table."""
+    """What is asked of files of predictions in one table: the data must agree."""
 
     data: _MadeFrom
     seed: int
@@ -177,14 +177,16 @@ def load(folder: str | os.PathLike[str]) -> Table:
 
 
 def of_files(paths: Sequence[str | os.PathLike[str]]) -> Table:
-    """A table of single files of predictions, named after the files.
+    """A table of single files of predictions, named after the files, and their folders where files share a name.
 
     Raises
     ------
     ValueError
         The files are not of the same data.
     """
-    entries = [_entry(_named_after(Path(path)), Path(path)) for path in paths]
+    entries = [
+        _entry(name, Path(path)) for name, path in zip(_names([*map(Path, paths)]), paths, strict=True)
+    ]
     made = [
         build(_Made, {key: entry.config.get(key) for key in ("data", "seed")}, f"{os.fspath(path)}, line 1")
         for entry, path in zip(entries, paths, strict=True)
@@ -231,9 +233,16 @@ def _entry(name: str, path: Path) -> Entry:
     return Entry(name=name, rows=read.rows, config=read.config)
 
 
-def _named_after(path: Path) -> str:
-    # The table's own row of that name must stay the only one.
-    return path.name if path.stem == IDENTITY else path.stem
+def _names(paths: Sequence[Path]) -> list[str]:
+    # As short as they differ: the file's name, that and the run's folder, the whole path.
+    own = [
+        path.name if path.stem == IDENTITY else path.stem for path in paths
+    ]  # the table has a row of that name
+    runs = [path.parent.parent if path.parent.name == "predictions" else path.parent for path in paths]
+    for names in (own, [f"{run.name}/{name}" for run, name in zip(runs, own, strict=True)]):
+        if len(set(names)) == len(names):
+            return names
+    return [str(path) for path in paths]
 
 
 def _with_identity(entries: list[Entry]) -> list[Entry]:

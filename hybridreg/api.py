@@ -123,7 +123,11 @@ def register(
     if isinstance(image, str) and image in names():
         raise ValueError(f"image: {image!r} is the name of a preset; give it as preset={image!r}")
     if isinstance(preset, Pipeline):
-        raise ValueError("preset: takes a name; a pipeline of your own is called: pipe(source, target)")
+        raise ValueError(
+            "preset: takes a name; a pipeline of your own is called: pipe(source, target); what is known "
+            "beforehand it takes by pipe.swap(prior={'max_rotation': 30}), a viewpoint with its cloud: "
+            "PointCloud.of(source, viewpoint=...)"
+        )
     pipeline = Pipeline.preset(preset, voxel=voxel)
     prior = Prior(
         init=init,

@@ -26,7 +26,7 @@ from hybridreg.runtime import optional_packages
 from hybridreg.runtime.resources import Clock, peak_memory_mb, reset_peak_memory
 from hybridreg.runtime.threads import one_blas
 from hybridreg.scene import Scene
-from hybridreg.slots import SLOTS, check_matches, checked
+from hybridreg.slots import SLOTS, check_matches, checked, in_order
 from hybridreg.stage import Stage, own_changes, same
 
 
@@ -212,7 +212,7 @@ class Pipeline(Stage):
             centre=raise_target(judgement.centre[None], pair)[0],
             evidence=judgement.evidence,
             notes=tuple(trace.scene.notes),
-            seconds=trace.seconds,
+            seconds={step: trace.seconds[step] for step in sorted(trace.seconds, key=in_order)},
             peak_memory_mb=peak_memory_mb(),
             seed=seed,
             spec=self.to_spec(),

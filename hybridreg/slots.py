@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""The five slots of a pipeline, as protocols: a stage conforms by its signature, without importing anything.
+"""The five slots of a pipeline, and what a stage of each returns: it conforms by its signature, without importing
+anything.
 
 A stage may also carry `needs` and `gives`, sets of the words below, so that a pipeline can refuse stages that do not
 fit when it is built: "image", "matches", "group".
@@ -7,46 +8,16 @@ fit when it is built: "image", "matches", "group".
 
 from __future__ import annotations
 
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
 from hybridreg.geometry import se3
 from hybridreg.matches import Correspondences, Overlap, Pose
-from hybridreg.pair import Pair
 from hybridreg.scene import Scene
 
 SLOTS = ("downsample", "overlap", "match", "estimate", "refine")
-
-
-class Downsample(Protocol):
-    """Make the two levels that the later stages work on."""
-
-    def __call__(self, pair: Pair, /) -> Scene: ...
-
-
-class FindOverlap(Protocol):
-    """Find which points lie in the part that both sensors saw."""
-
-    def __call__(self, scene: Scene, /) -> Overlap: ...
-
-
-class Match(Protocol):
-    """Pair points of the source with points of the target."""
-
-    def __call__(self, scene: Scene, overlap: Overlap, /) -> Correspondences: ...
-
-
-class Estimate(Protocol):
-    """Find the pose, from the matches or from the clouds themselves."""
-
-    def __call__(self, scene: Scene, matches: Correspondences, rng: np.random.Generator, /) -> Pose: ...
-
-
-class Refine(Protocol):
-    """Improve a pose that is nearly right."""
-
-    def __call__(self, scene: Scene, pose: Pose, /) -> Pose: ...
+_STEPS = ("prior", *SLOTS, "verdict")
 
 
 # By how much a pose's rotation may be off before that is told: from float32, or a motion that drifted; by hand.
@@ -65,6 +36,11 @@ _KINDS: dict[str, tuple[type, str]] = {
     "estimate": (Pose, "hybridreg.Pose(T) takes a (4, 4) matrix from source to target"),
     "refine": (Pose, "hybridreg.Pose(T) takes a (4, 4) matrix from source to target"),
 }
+
+
+def in_order(step: str) -> int:
+    """Where a step of a registration comes, by which its seconds are told; last what is none."""
+    return _STEPS.index(step) if step in _STEPS else len(_STEPS)
 
 
 def checked(slot: str, stage: Any, value: Any, scene: Scene | None = None) -> Any:

@@ -61,7 +61,7 @@ class Stage:
         return params
 
     def replace(self, **changes: Any) -> Self:
-        """A copy with some fields changed; `field__name` reaches into a nested stage."""
+        """A copy with some fields changed; `field__name` reaches into a nested stage, as deep as need be."""
         return dataclasses.replace(self, **own_changes(self, changes))  # type: ignore[type-var]
 
 
@@ -78,11 +78,13 @@ def own_changes(stage: Any, changes: Mapping[str, Any]) -> dict[str, Any]:
 def _with(nested: Any, field: str, value: Any, key: str) -> Any:
     if isinstance(nested, str):
         nested = {"stage": nested}
-    if isinstance(nested, Mapping):  # built with all its fields at once: some need others
-        return {**nested, field: value}
+    if nested is None or isinstance(nested, Mapping):  # built with all its fields at once: some need others
+        outer, _, inner = field.partition("__")
+        nested = nested or {}
+        return {**nested, outer: _with(nested.get(outer), inner, value, key) if inner else value}
     if not dataclasses.is_dataclass(nested):
         raise TypeError(f"{key}: {nested!r} has no fields")
-    return dataclasses.replace(nested, **{field: value})  # type: ignore[type-var]
+    return dataclasses.replace(nested, **own_changes(nested, {field: value}))  # type: ignore[type-var]
 
 
 def same(one: Any, other: Any) -> bool:

@@ -243,8 +243,35 @@ def test_a_field_of_a_stage_that_is_named_in_the_same_breath() -> None:
     assert hr.Pipeline().replace(match="fcgf", match__size="nano", match__untrained=True).match.size == "nano"
     candidates = hr.Candidates().replace(refine={"stage": "icp"}, refine__iterations=2)
     assert candidates.refine == hr.Icp(iterations=2)
+    inside = hr.Pipeline(estimate=candidates).replace(estimate__refine__iterations=3)
+    assert inside.estimate.refine == hr.Icp(iterations=3)
+    bounded = hr.Pipeline().replace(prior__max_rotation=30.0)
+    assert bounded.prior == hr.Pipeline().swap(prior={"max_rotation": 30.0}).prior
     with pytest.raises(TypeError, match="estimate__tries: <function .* has no fields"):
         hr.Pipeline().replace(estimate=lambda *_: None, estimate__tries=3)
+
+
+def test_a_file_name_promises_no_other_format(tmp_path: Path) -> None:
+    with pytest.raises(
+        ValueError, match=r"mine\.json: a pipeline is written as TOML; end the name in \.toml"
+    ):
+        hr.Pipeline().save(tmp_path / "mine.json")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_seconds_are_told_in_the_order_of_the_slots() -> None:
+    from hybridreg.slots import in_order
+
+    ran = ["verdict", "total", "match", "downsample", "refine", "overlap", "estimate"]
+    assert sorted(ran, key=in_order) == [
+        "downsample",
+        "overlap",
+        "match",
+        "estimate",
+        "refine",
+        "verdict",
+        "total",
+    ]
 
 
 def test_mistyped_keyword_is_refused_at_once() -> None:

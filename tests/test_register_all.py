@@ -17,6 +17,7 @@ from hybridreg.data.hard import box_world
 from hybridreg.data.loaders.folder import load_pair
 from hybridreg.geometry import se3
 from hybridreg.many import link_search
+from hybridreg.many.alignment_words import against_cloud
 from hybridreg.many.links import Link, best_tree, groups, placed
 from hybridreg.many.other_ways import elsewhere
 from hybridreg.runtime.open3d import load_open3d
@@ -290,6 +291,31 @@ def test_a_pair_is_as_sure_as_its_link() -> None:
     assert [verdict(word) for word in ("ok", "given", "doubtful")] == ["ok", "doubtful", "doubtful"]
 
 
+def test_what_is_said_of_a_cloud_is_not_said_of_one_whose_name_begins_alike() -> None:
+    truth, links, _ = graph(3, 0, 0)
+    both = [next(link for link in links if {link.source, link.target} == {0, k}) for k in (1, 2)]
+    found = hr.Alignment(
+        names=("map", "scan", "scan (2)"),
+        poses=truth,
+        reference=0,
+        links=tuple(replace(link, role="tree", verdict="ok") for link in both),
+        reasons=(),
+        seconds=0.0,
+    )
+    assert found.n_links.tolist() == [2, 1, 1]
+    assert [list(against_cloud(found, row)) for row in range(3)] == [
+        [],
+        ["scan hangs on one link, which nothing confirms"],
+        ["scan (2) hangs on one link, which nothing confirms"],
+    ]
+
+
+def test_a_preset_beside_a_pipeline_is_refused() -> None:
+    clouds = [np.eye(3), np.eye(3)]
+    with pytest.raises(ValueError, match="preset='verify' and a pipeline: give one of them"):
+        hr.register_all(clouds, preset="verify", pipeline=hr.Pipeline())
+
+
 @pytest.mark.parametrize(("reference", "doubted"), [(0, [5, 6, 7]), (6, [0, 1, 2, 3, 4])])
 def test_doubtful_links_between_two_groups_confirm_nothing_however_many(
     reference: int, doubted: list[int]
@@ -310,6 +336,9 @@ def test_doubtful_links_between_two_groups_confirm_nothing_however_many(
     )
     assert found.doubted == doubted
     assert found.verdict == "doubtful"
+    for row in range(8):
+        told = " ".join(against_cloud(found, row))
+        assert ("only doubtful links" in told) == (row in doubted)
     one_ok = [replace(link, verdict="ok") if {link.source, link.target} == {4, 5} else link for link in links]
     assert replace(found, links=tuple(one_ok)).verdict == "ok"
 

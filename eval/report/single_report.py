@@ -173,7 +173,7 @@ def _pictures(pair: Pair, result: RegistrationResult, laid: LaidOut) -> Iterator
     yield page.paragraph(
         f"{len(laid.violations)} of {laid.looked} sampled points lie where the other sensor saw through.{untested}"
     )
-    yield orbit_view.html(_layers(result, laid, most))
+    yield orbit_view.html(_layers(laid, most))
     yield page.heading("Other poses that explain the clouds nearly as well")
     middle = np.median(sized(pair.source, result.scale).points, axis=0) + result.scale * pair.source.offset
     words = pose_words.rivals(result, middle)
@@ -185,7 +185,7 @@ def _pictures(pair: Pair, result: RegistrationResult, laid: LaidOut) -> Iterator
         yield page.paragraph("Others: " + "; ".join(words[3:]))
 
 
-def _layers(result: RegistrationResult, laid: LaidOut, most: float) -> list[orbit_view.Layer]:
+def _layers(laid: LaidOut, most: float) -> list[orbit_view.Layer]:
     layer = orbit_view.Layer
     rivals = [
         layer(f"source at rival {k + 1}", se3.apply(T, laid.source), "#7570b3", shown=False)

@@ -11,6 +11,7 @@ from hybridreg.eval.run.row import Row
 from hybridreg.eval.score import errors
 from hybridreg.eval.score.protocols import Protocol
 from hybridreg.eval.score.scoring import Score
+from hybridreg.slots import in_order
 
 Cells = dict[str, str]
 
@@ -26,8 +27,8 @@ def results(name: str, score: Score) -> Cells:
         "95 % interval": f"{percent(score.recall_low)} to {percent(score.recall_high)}",
         "RRE° all": number(score.rre_deg_all, 2),
         "RTE m all": number(score.rte_m_all, 2),
-        "RRE° ok": number(score.rre_deg_ok, 2),
-        "RTE m ok": number(score.rte_m_ok, 2),
+        "RRE° successes": number(score.rre_deg_ok, 2),
+        "RTE m successes": number(score.rte_m_ok, 2),
         "RRE° median": number(score.rre_deg_median, 2),
         "RTE m median": number(score.rte_m_median, 2),
     }
@@ -66,8 +67,8 @@ def thresholds(name: str, score: Score) -> Cells:
 
 def stages(scores: Mapping[str, Score]) -> list[Cells]:
     """Mean seconds of each stage, one line a method."""
-    names = list(dict.fromkeys(stage for score in scores.values() for stage in score.seconds))
-    names.sort(key=lambda stage: stage == "total")
+    ran = dict.fromkeys(stage for score in scores.values() for stage in score.seconds)
+    names = sorted(ran, key=in_order)
     return [
         {"method": name, **{f"{s} s": number(score.seconds.get(s, math.nan), 3) for s in names}}
         for name, score in scores.items()

@@ -57,7 +57,7 @@ def refuse_foreign(path: Path) -> None:
     """
     begun = path.read_bytes()
     if not json.dumps({"format": FORMAT}).encode().startswith(begun[:20]):
-        raise ValueError(f"{path}: not a file of predictions; choose another --out")
+        raise ValueError(f"{path}: not a file of predictions; write to another path")
 
 
 def header_of(line: str, path: str | os.PathLike[str]) -> dict[str, Any]:

@@ -6,12 +6,13 @@ from __future__ import annotations
 import json
 import os
 import warnings
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from hybridreg.config.differences import differences
 from hybridreg.eval.run.header import FORMAT, header_of, refuse_foreign, whole_lines
 from hybridreg.eval.run.row import Row
 from hybridreg.io.atomic import write_text
@@ -19,7 +20,7 @@ from hybridreg.io.faults import naming
 from hybridreg.io.line_file import LineFile, cut
 from hybridreg.io.lock import file_lock
 
-_CURE = "add --overwrite to start over, or choose another --out"
+_CURE = "pass overwrite=True to start over, or write to another path"
 
 
 @dataclass(frozen=True, eq=False)
@@ -175,16 +176,3 @@ def _by_content(config: Mapping[str, Any]) -> dict[str, Any]:
     if not isinstance(data, Mapping) or not data.get("fingerprint"):
         return dict(config)
     return {**config, "data": {key: value for key, value in data.items() if key != "name"}}
-
-
-def differences(old: Any, new: Any, name: str = "") -> Iterator[str]:
-    """What changed between two configurations, one phrase a leaf."""
-    if isinstance(old, Mapping) and isinstance(new, Mapping):
-        for key in sorted({*old, *new}):
-            yield from differences(old.get(key), new.get(key), f"{name}.{key}" if name else key)
-    elif old != new:
-        yield f"{name}: {_short(old)} before, {_short(new)} now"
-
-
-def _short(value: Any) -> str:
-    return "unset" if value is None else json.dumps(value)

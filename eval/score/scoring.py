@@ -15,6 +15,7 @@ from hybridreg.eval.run.store import Predictions
 from hybridreg.eval.score import bootstrap, errors
 from hybridreg.eval.score.errors import Errors, Step
 from hybridreg.eval.score.protocols import INLIER_RADII, RECALL_AT, Protocol
+from hybridreg.eval.score.protocols import protocol as protocol_named
 
 Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -83,16 +84,19 @@ class Score:
         ]
 
 
-def score(rows: Sequence[Row] | Predictions, protocol: Protocol) -> Score:
-    """Score rows, as `predict` returns them, or what `read` returns.
+def score(rows: Sequence[Row] | Predictions, protocol: Protocol | str) -> Score:
+    """Score rows, as `predict` returns them, or what `read` returns, under a protocol or the one of a name.
 
     Raises
     ------
     TypeError
         Neither of these, or no protocol.
+    KeyError
+        No protocol has that name.
     ValueError
         No rows, or rows that do not hold what the protocol needs.
     """
+    protocol = protocol_named(protocol) if isinstance(protocol, str) else protocol
     rows = list(rows.rows if isinstance(rows, Predictions) else rows)
     wrong = next((row for row in rows if not isinstance(row, Row)), None)
     if wrong is not None:

@@ -24,7 +24,11 @@ Settings = Annotated[
 Voxel = Annotated[float | None, typer.Option(help="Voxel, metres; derived from the clouds if not given.")]
 Seed = Annotated[int, typer.Option(help="Fixes every random choice.")]
 Protocols = Annotated[
-    list[str] | None, typer.Option("--protocol", help="Evaluation protocol by name; repeatable.")
+    list[str] | None,
+    typer.Option(
+        "--protocol",
+        help="By name; repeatable. If none: the table's, or cross3dreg and kitti.",
+    ),
 ]
 Workers = Annotated[int, typer.Option(min=1, help="Processes, each with one thread.")]
 Overwrite = Annotated[bool, typer.Option("--overwrite", help="Run again what the folder already holds.")]

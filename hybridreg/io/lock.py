@@ -140,7 +140,7 @@ class Lock:
 
     def _refusal(self, told: Owner | None) -> str:
         who = told or "another process"
-        return f"{self.what} is being written by {who}; wait for it, end it, or choose another --out"
+        return f"{self.what} is being written by {who}; wait for it, end it, or write to another path"
 
 
 def folder_lock(folder: str | os.PathLike[str], part: str = "") -> Lock:

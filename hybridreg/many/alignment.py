@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -61,7 +60,7 @@ class Alignment:
     @property
     def hanging(self) -> list[int]:
         """Placed clouds that hang on one link, where there are more than two clouds."""
-        few = self._links_of(self._used) < 2
+        few = self.n_links < 2
         return [] if len(self.names) < 3 else [int(k) for k in np.flatnonzero(few & self.placed)]
 
     @property
@@ -77,8 +76,10 @@ class Alignment:
     def _used(self) -> list[Link]:
         return [link for link in self.links if link.role in ("tree", "loop")]
 
-    def _links_of(self, links: Sequence[Link]) -> NDArray[np.int64]:
-        ends = [k for link in links for k in (link.source, link.target)]
+    @property
+    def n_links(self) -> NDArray[np.int64]:
+        """How many links that agree each cloud takes part in, (n,)."""
+        ends = [k for link in self._used for k in (link.source, link.target)]
         return np.bincount(np.array(ends, dtype=np.int64), minlength=len(self.names))
 
     def summary(self) -> str:

@@ -9,6 +9,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, TypeVar
 
+from hybridreg.config.differences import differences
 from hybridreg.io.line_file import cut, whole_lines
 
 Value = TypeVar("Value")
@@ -33,10 +34,11 @@ def kept(path: Path, settings: Mapping[str, Any], parse: Callable[[list[Any]], V
         header, *rows = (json.loads(line) for line in lines)
         found = parse(rows)
     except (ValueError, TypeError, KeyError) as error:
-        raise ValueError(f"{path}: damaged ({error}); add --overwrite to make it anew") from error
-    if header != json.loads(json.dumps(settings)):
+        raise ValueError(f"{path}: damaged ({error}); pass overwrite=True to make it anew") from error
+    if changed := "; ".join(differences(header, json.loads(json.dumps(settings)))):
         raise ValueError(
-            f"{path}: was made with other settings; add --overwrite to make it anew, or choose another --out"
+            f"{path}: was made with other settings ({changed}); pass overwrite=True to make it anew, or write to "
+            "another path"
         )
     cut(path, length)
     return found

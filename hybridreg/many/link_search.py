@@ -16,15 +16,15 @@ from hybridreg.cloud import PointCloud
 from hybridreg.geometry import se3
 from hybridreg.geometry.extent import reach
 from hybridreg.geometry.viewpoint import centre
+from hybridreg.many import alignment_words
 from hybridreg.many.alignment import Alignment
 from hybridreg.many.known_links import checked, judged
-from hybridreg.many.links import DEGREES, Link, agrees, all_placed, best_tree, groups, placed
+from hybridreg.many.links import Link, agrees, all_placed, best_tree, groups, placed
 from hybridreg.many.other_ways import elsewhere
 from hybridreg.many.overlap_guess import signature, unlike
 from hybridreg.many.pose_graph import optimised
 from hybridreg.pair import Pair
 from hybridreg.pipeline import Pipeline
-from hybridreg.resolution import Tolerance
 from hybridreg.runtime.open3d import load_open3d
 from hybridreg.runtime.workers import spread
 
@@ -108,7 +108,7 @@ def aligned(
         reasons=(),
         seconds=time.perf_counter() - start,
     )
-    return replace(found, reasons=tuple(_reasons(found)))
+    return replace(found, reasons=tuple(alignment_words.reasons(found)))
 
 
 def _key(a: int, b: int, poses: Array | None) -> Key:
@@ -211,26 +211,3 @@ def _role(link: Link, tree: Sequence[Link], fit: Sequence[Link], poses: Array, m
     if link in fit and (np.isnan(poses[link.source]).any() or agrees(link, poses, middles)):
         return "loop"
     return "contradicts" if link.confidence >= _TAKES_PART else "failed"
-
-
-def _reasons(found: Alignment) -> Iterable[str]:
-    for link in found.links:
-        if link.off is not None and not link.off.within(Tolerance(DEGREES, link.metres)):
-            yield (
-                f"{found.names[link.source]} -> {found.names[link.target]} was given {link.off.metres:.2g} m and "
-                f"{link.off.degrees:.1f} deg away from where the clouds lie on one another, and they were believed"
-            )
-        if link.role == "contradicts":
-            pair = f"{found.names[link.source]} -> {found.names[link.target]} ({link.verdict})"
-            yield f"{pair} contradicts the other links and was left out"
-    for row in np.flatnonzero(~found.placed):
-        yield f"{found.names[row]} is not placed: nothing ties it to {found.names[found.reference]}"
-    for k in found.hanging:
-        yield f"{found.names[k]} hangs on one link, which nothing confirms"
-    for k in found.doubted:
-        yield (
-            f"only doubtful links, or given ones that the clouds do not confirm, join {found.names[k]} to "
-            f"{found.names[found.reference]}: register it with one of those, and read the reasons"
-        )
-    for k in found.unsure:
-        yield f"{found.names[k]} may lie elsewhere: with rivals of doubtful links as many agree"

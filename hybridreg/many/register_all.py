@@ -63,6 +63,8 @@ def register_all(
         raise ValueError(
             f"voxel={voxel} is a preset's; give the pipeline its own: pipeline.swap(voxel={voxel})"
         )
+    if pipeline is not None and preset != DEFAULT:
+        raise ValueError(f"preset={preset!r} and a pipeline: give one of them")
     clouds = _listed(clouds)
     told = _names(clouds, names)
     if not is_row(reference, len(clouds)):

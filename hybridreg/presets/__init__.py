@@ -49,8 +49,14 @@ def read(path: str | os.PathLike[str]) -> dict[str, Any]:
     return _slots(read_toml(path), os.fspath(path))
 
 
+# Endings that promise another format.
+_NO_TOML = (".json", ".yaml", ".yml", ".ini", ".cfg", ".xml", ".pkl", ".pickle", ".joblib")
+
+
 def write(path: str | os.PathLike[str], slots: dict[str, Any]) -> None:
     """Write slots as TOML, whole or not at all."""
+    if Path(path).suffix.lower() in _NO_TOML:
+        raise ValueError(f"{os.fspath(path)}: a pipeline is written as TOML; end the name in .toml")
     import tomli_w
 
     from hybridreg.io.atomic import atomic_path

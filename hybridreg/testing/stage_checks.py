@@ -31,9 +31,9 @@ def checks() -> list[Check]:
     """The individual checks, for `pytest.mark.parametrize`."""
     return [
         check_parameters,
+        check_seed,
         check_pickle_and_clone,
         check_output,
-        check_seed,
         check_permuted_points,
         check_near_truth,
         check_rigid_motion,

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import torch
 from torch import Tensor
 
 from hybridreg.learned.cofinet.config import SelectionConfig
@@ -48,9 +47,3 @@ def select(probability: Tensor, config: SelectionConfig) -> tuple[NodePairs, lis
         best = confidence.topk(config.max_pairs).indices.sort().values
         source, target, confidence = source[best], target[best], confidence[best]
     return NodePairs(source, target, confidence), tried
-
-
-def empty_pairs(device: torch.device | str = "cpu") -> NodePairs:
-    """No pairs."""
-    none = torch.zeros(0, dtype=torch.int64, device=device)
-    return NodePairs(none, none, torch.zeros(0, device=device))

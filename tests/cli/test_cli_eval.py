@@ -169,6 +169,20 @@ def test_report_of_single_files_and_of_data_that_has_gone(pairs: Path, tmp_path:
     assert call("report", *files, "--data", "nowhere").exit_code == 2
 
 
+def test_report_compares_runs_by_their_folders(pairs: Path, tmp_path: Path) -> None:
+    for out, seed in (("one", 0), ("two", 5)):
+        assert call("eval", "--data", pairs, *PLAIN, "--seed", seed, "--out", out).exit_code == 0
+    result = call("report", "one", "two", "--out", "both")
+    assert result.exit_code == 0, result.output
+    told = (tmp_path / "both" / "table.md").read_text()
+    assert "| one/" in told
+    assert "| two/" in told
+    (tmp_path / "empty").mkdir()
+    refused = call("report", "one", "empty")
+    assert refused.exit_code == 2
+    assert "empty: holds no predictions" in refused.stderr
+
+
 def test_report_draws_what_the_stages_made(pairs: Path, tmp_path: Path) -> None:
     matching = ["--set", "match=fpfh", "--set", "estimate=svd", "--set", "refine=none", "--voxel", "1.0"]
     assert call("eval", "--data", pairs, *matching, "--out", "run").exit_code == 0

@@ -106,7 +106,7 @@ def test_table_eval_predict_and_train_stop_before_the_first_pair(
     monkeypatch.setattr(opened_source, "pair_fingerprints_of", lambda *_: pytest.fail("beyond the check"))
     source = type("Source", (), {"data": str(root), "pairs": 0, "prepared": True, "title": "mine"})()
     with pytest.raises(ValueError, match="seem to map target to source"):
-        opened_source.opened(source, None, tmp_path, rescales=False)  # type: ignore[arg-type]
+        opened_source.opened(source, tmp_path, rescales=False)
     done = CliRunner().invoke(app, ["datasets", "inspect", str(root)])
     assert done.exit_code == 2
     assert "#inverted" in done.stderr

@@ -153,7 +153,7 @@ def test_data_that_changed_under_the_same_size_and_time_is_refused(
         file.write_text(text.replace("0.", "1.", 1) if "0." in text else text.replace("0", "1", 1))
     else:
         change_keeping_looks(file)
-    with pytest.raises(ValueError, match=r"data\.fingerprint: .*; add --overwrite"):
+    with pytest.raises(ValueError, match=r"data\.fingerprint: .*; pass overwrite=True"):
         predict(RIGHT, pairs(), tmp_path / "p.jsonl")
     assert len(predict(RIGHT, pairs(), tmp_path / "p.jsonl", overwrite=True)) == 2 * (starts + 1)
 

@@ -245,7 +245,7 @@ def test_a_changed_configuration_is_refused_and_named(
 
     run(**first)
     before = path.read_bytes()
-    with pytest.raises(ValueError, match="--overwrite") as refused:
+    with pytest.raises(ValueError, match="overwrite=True") as refused:
         run(**{**first, **change})
     assert told in str(refused.value)
     assert path.read_bytes() == before

@@ -82,6 +82,11 @@ def test_files_of_the_same_data_make_a_table(ran: tuple[Table, Path], tmp_path: 
     _, out = ran
     files = [out / "predictions" / name for name in ("moody-b.jsonl", "exact.jsonl")]
     assert [entry.name for entry in table_run.of_files(files).entries] == ["identity", "moody-b", "exact"]
+    again = tmp_path / "again" / "predictions" / "exact.jsonl"
+    again.parent.mkdir(parents=True)
+    again.write_bytes(files[1].read_bytes())
+    both = table_run.of_files([files[1], again])
+    assert [entry.name for entry in both.methods] == [f"{out.name}/exact", "again/exact"]
     own = tmp_path / "identity.jsonl"
     own.write_bytes(files[0].read_bytes())
     assert [entry.name for entry in table_run.of_files([own]).entries] == ["identity", "identity.jsonl"]
@@ -105,7 +110,7 @@ def test_caption_names_data_starts_and_protocol(ran: tuple[Table, Path]) -> None
 def test_markdown_tells_all_that_was_promised(ran: tuple[Table, Path]) -> None:
     text = formats.markdown(ran[0], RECIPE.protocols)
     head = next(line for line in text.splitlines() if line.startswith("| method | recall %"))
-    for column in ("95 % interval", "RRE° all", "RTE m all", "RRE° ok", "RTE m ok", "RRE° median",
+    for column in ("95 % interval", "RRE° all", "RTE m all", "RRE° successes", "RTE m successes", "RRE° median",
                    "RTE m median", "inliers %", "no pose", "s a pair", "peak MB",
                    "recall % unrefined"):  # fmt: skip
         assert f"| {column} " in head

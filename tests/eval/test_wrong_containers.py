@@ -46,8 +46,11 @@ def test_rows_come_from_predict_or_from_read(tmp_path: Path) -> None:
     assert score((row for row in rows), rule).n == 1  # type: ignore[arg-type]
     with pytest.raises(TypeError, match="rows: expected what predict or read returned, got str among them"):
         score(str(path), rule)  # type: ignore[arg-type]
-    with pytest.raises(TypeError, match=r"protocol 'kitti': expected one such as hybridreg\.eval\.protocol"):
-        score(rows, "kitti")  # type: ignore[arg-type]
+    assert score(rows, "kitti").rre_deg_all == wanted.rre_deg_all
+    with pytest.raises(KeyError, match=r"no protocol is called 'kiti'\. Known: .*kitti"):
+        score(rows, "kiti")
+    with pytest.raises(TypeError, match=r"protocol 2\.0: expected one such as hybridreg\.eval\.protocol"):
+        score(rows, 2.0)  # type: ignore[arg-type]
 
 
 def test_a_pair_is_found_by_its_number() -> None:

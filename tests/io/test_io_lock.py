@@ -42,7 +42,7 @@ def holder(folder: Path) -> subprocess.Popen[str]:
 def test_the_second_is_told_who_writes_and_since_when(tmp_path: Path) -> None:
     with folder_lock(tmp_path), pytest.raises(InUse) as refused, folder_lock(tmp_path):
         pytest.fail("held twice")
-    for part in (str(tmp_path), f"process {os.getpid()} on ", " since 20", "choose another --out"):
+    for part in (str(tmp_path), f"process {os.getpid()} on ", " since 20", "write to another path"):
         assert part in str(refused.value)
     assert list(tmp_path.iterdir()) == []
     with folder_lock(tmp_path):  # and it is free again

@@ -21,6 +21,8 @@ CURES = (
     (r"choose a (smaller|larger) voxel\b", (r"choose a \1 --voxel", r"choose a \1 voxel")),
     (r"a (smaller|larger) voxel or another unit", (r"a \1 --voxel or another unit",)),
     (r'choose one with topic="..."', ("choose one with --topic", _TOPIC)),
+    (r"pass overwrite=True", ("add --overwrite",)),
+    (r"write to another path", ("choose another --out",)),
     (r"choose another index", ("choose another --index", _INDEX)),
     (r"without weights=\.\.\.", ("without --set SLOT.weights=...", "without weights = ...")),
     (

@@ -15,7 +15,6 @@ from hybridreg.data.hard.true_poses import Sample
 from hybridreg.geometry import se3
 
 Array = NDArray[np.float64]
-_ANY = (LIDARS, LIDARS)
 
 
 def plain(rng: np.random.Generator, seed: int) -> Sample:

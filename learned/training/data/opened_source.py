@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from typing_extensions import Self
 
     from hybridreg.learned.training.data.augmentation import Augmentation
-    from hybridreg.learned.training.recipe import Recipe, Source
+    from hybridreg.learned.training.recipe import Source
 
 # Beside the prepared pairs: hashes of the files they came from.
 _DIGESTS = "contents.json"
@@ -98,9 +98,7 @@ class LazyPair:
         return self._read
 
 
-def opened(
-    source: Source, recipe: Recipe, cache: Path, *, rescales: bool, told: bool = True
-) -> dict[str, Any]:
+def opened(source: Source, cache: Path, *, rescales: bool, told: bool = True) -> dict[str, Any]:
     """The fields of an `OpenedSource`, all of whose pairs count as usable.
 
     Parameters

@@ -96,5 +96,5 @@ def open_source(source: Source, recipe: Recipe, cache: Path, *, told: bool = Tru
     ValueError, FileNotFoundError
         The data cannot be opened, or has no pairs.
     """
-    fields = opened(source, recipe, cache, rescales=recipe.augmentation.rescales, told=told)
+    fields = opened(source, cache, rescales=recipe.augmentation.rescales, told=told)
     return PairSource(**fields, config=recipe.network, partner=recipe.infonce.partner)

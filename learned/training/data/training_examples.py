@@ -79,7 +79,7 @@ class ExampleSource(OpenedSource):
 
 def open_examples(source: Source, recipe: Recipe, cache: Path, *, told: bool = True) -> ExampleSource:
     """Open a source; errors as `opened`."""
-    fields = opened(source, recipe, cache, rescales=False, told=told)
+    fields = opened(source, cache, rescales=False, told=told)
     return ExampleSource(**fields, kind=recipe.kind, config=recipe.network)
 
 
