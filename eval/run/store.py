@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from hybridreg.config.differences import differences
+from hybridreg.config.changed_settings import differences
 from hybridreg.eval.run.header import FORMAT, header_of, refuse_foreign, whole_lines
 from hybridreg.eval.run.row import Row
 from hybridreg.io.atomic import write_text

@@ -43,7 +43,9 @@ def command(
     pairs: Annotated[
         list[str] | None, typer.Option("--pair", help="A pair by its name; repeatable; else the first few.")
     ] = None,
-    worst: Annotated[int, typer.Option(min=0, help="Instead, so many pairs of the largest errors.")] = 0,
+    worst: Annotated[
+        int, typer.Option(min=0, help="This many pairs of the largest errors, in place of named ones.")
+    ] = 0,
     data: Annotated[str | None, typer.Option(help="Where the data lies now.")] = None,
     protocol: Annotated[
         str | None, typer.Option(help="Rule of scoring; the table's first if not given.")

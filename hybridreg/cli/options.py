@@ -41,7 +41,9 @@ Index = Annotated[
 At = Annotated[
     str | None, typer.Option(metavar="S[,S]", help="Seconds after a bag's start, instead of --index.")
 ]
-Accumulate = Annotated[str | None, typer.Option(metavar="N[,N]", help="So many messages laid together.")]
+Accumulate = Annotated[
+    str | None, typer.Option(metavar="N[,N]", help="Lay so many messages of a bag on one another.")
+]
 
 Format = Annotated[
     str,

@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, TypeVar
 
-from hybridreg.config.differences import differences
+from hybridreg.config.changed_settings import differences
 from hybridreg.io.line_file import cut, whole_lines
 
 Value = TypeVar("Value")

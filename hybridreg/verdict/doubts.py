@@ -97,8 +97,7 @@ class Doubts:
     def about_pose(self) -> bool:
         """Whether another pose may be right."""
         found = any(each is not None for each in (self.slack, self.traffic, self.one_thing, self.one_place))
-        one_thing = self.lone_thing or self.seen_past
-        return self.through_walls or self.alike or one_thing or self.corner or found
+        return found or any((self.through_walls, self.alike, self.lone_thing, self.seen_past, self.corner))
 
     @property
     def about_source(self) -> bool:
