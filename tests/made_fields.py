@@ -10,9 +10,13 @@ from hybridreg.geometry import se3
 from hybridreg.pair import Pair
 
 _WAVES = 40
+# Where the mound stands, in the target's frame, and its radius, metres.
+MOUND, _RADIUS = np.array([4.0, -2.0]), 3.0
 
 
-def field_pair(*, bumps: float = 0.02, noise: float = 0.01, points: int = 40_000) -> tuple[Pair, np.ndarray]:
+def field_pair(
+    *, bumps: float = 0.02, noise: float = 0.01, points: int = 40_000, mound: float = 0.0
+) -> tuple[Pair, np.ndarray]:
     """Two clouds of one field from places nine metres apart, and the true pose.
 
     Parameters
@@ -21,6 +25,8 @@ def field_pair(*, bumps: float = 0.02, noise: float = 0.01, points: int = 40_000
         Standard deviation of the ground's height, metres, in waves of 3 to 8 m.
     noise : float
         Of each point's height, metres.
+    mound : float
+        Height of one round mound between both places, metres.
     """
     rng = np.random.default_rng(0)
     number = 2.0 * np.pi / rng.uniform(3.0, 8.0, _WAVES)
@@ -36,6 +42,8 @@ def field_pair(*, bumps: float = 0.02, noise: float = 0.01, points: int = 40_000
 
     def laid(xy: np.ndarray) -> np.ndarray:
         height = bumps * np.sqrt(2.0 / _WAVES) * np.sin(xy @ k.T + phase).sum(axis=1)
+        from_top = np.linalg.norm(xy - MOUND, axis=1) / _RADIUS
+        height += mound * np.cos(0.5 * np.pi * np.minimum(from_top, 1.0)) ** 2
         return np.column_stack([xy, height + rng.normal(0.0, noise, len(xy)) - 1.8])
 
     target = laid(seen())

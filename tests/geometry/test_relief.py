@@ -5,12 +5,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from made_fields import field_pair
+from made_fields import MOUND, field_pair
 
 import hybridreg as hr
 from hybridreg.evidence import views
 from hybridreg.geometry import se3
-from hybridreg.geometry.ground_relief import Alike, Relief, alike
+from hybridreg.geometry.ground_relief import TELLS, Alike, Relief, alike
 
 
 def reliefs(**how: float) -> tuple[Relief, Relief, np.ndarray]:
@@ -37,6 +37,16 @@ def test_noise_on_a_plane_tells_nothing() -> None:
     told = alike(source, target, truth)
     assert told.cells > 200
     assert abs(told.correlation) < 0.2
+
+
+def test_one_mound_on_flat_ground_tells_nothing_and_on_a_field_the_field_does() -> None:
+    # A turn about the mound lays it on itself, and the flat ground around it too.
+    top = np.array([*MOUND, -1.8])
+    for bumps in (0.0, 0.02):
+        source, target, truth = reliefs(bumps=bumps, mound=0.25)
+        turned = se3.about(top, se3.yaw(90.0)[:3, :3], np.zeros(3)) @ truth
+        assert alike(source, target, turned).information < TELLS
+        assert (alike(source, target, truth).information > TELLS) == (bumps > 0.0)
 
 
 def test_a_pair_turned_round_says_the_same() -> None:
