@@ -21,6 +21,7 @@ from hybridreg.matches import Correspondences, EntryTrace
 from hybridreg.output import picture, result_words
 from hybridreg.output.pose_text import pose_text
 from hybridreg.resolution import VEHICLES, Tolerance
+from hybridreg.runtime.read_only import lock
 
 Array = NDArray[np.float64]
 Word = Literal["ok", "doubtful", "failed"]
@@ -105,6 +106,9 @@ class RegistrationResult:
     scale_verdict: Word | None = None
     found: bool = True
 
+    def __post_init__(self) -> None:
+        lock(self, "transformation", "information", "rivals", "centre")
+
     @property
     def T_target_source(self) -> Array:
         """The transformation, under the name that states its direction."""
@@ -140,7 +144,9 @@ class RegistrationResult:
         """Covariance (6, 6) of a right pose's error: turns about `centre` (radians) before translations (metres), along
         the target's axes; infinite where the surfaces leave a direction open. See `hybridreg.evidence.covariance` for
         what its scale was checked against. It says nothing of a wrong pose: that is `confidence`."""
-        return of_information(self.information, self.tolerance)
+        found = of_information(self.information, self.tolerance)
+        found.setflags(write=False)
+        return found
 
     def apply(self, points: Any) -> Array:
         """Points of the source (N, 3), or any cloud that `PointCloud.of` takes, in the target's coordinates: (N, 3).

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybridreg.many.links import Link, groups
+from hybridreg.runtime.read_only import lock
 
 Array = NDArray[np.float64]
 
@@ -41,6 +42,9 @@ class Alignment:
     reasons: tuple[str, ...]
     seconds: float
     unsure: tuple[int, ...] = ()
+
+    def __post_init__(self) -> None:
+        lock(self, "poses")
 
     @property
     def placed(self) -> NDArray[np.bool_]:

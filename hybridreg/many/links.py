@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from hybridreg.geometry import se3
 from hybridreg.resolution import Tolerance
+from hybridreg.runtime.read_only import lock
 
 Array = NDArray[np.float64]
 Role = Literal["tree", "loop", "contradicts", "failed"]
@@ -50,6 +51,9 @@ class Link:
     role: Role = "failed"
     rivals: Array = field(default_factory=lambda: np.zeros((0, 4, 4)))
     off: Tolerance | None = None
+
+    def __post_init__(self) -> None:
+        lock(self, "T_target_source", "rivals")
 
 
 def placed(n: int, tree: Iterable[Link], root: int) -> Array:

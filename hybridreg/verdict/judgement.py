@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from hybridreg.evidence import match_agreement
 from hybridreg.geometry.fitness import Overlay
 from hybridreg.matches import Correspondences, Pose
+from hybridreg.resolution import tolerance
 from hybridreg.scene import Scene
 from hybridreg.search.hypothesis import Hypothesis
 from hybridreg.verdict.confidence import (
@@ -20,6 +21,7 @@ from hybridreg.verdict.confidence import (
     Word,
     word,
 )
+from hybridreg.verdict.shared_points import shared_points
 from hybridreg.verdict.weighing import Weighed, weigh
 from hybridreg.verdict.words import reasons
 
@@ -72,7 +74,9 @@ def judge(scene: Scene, pose: Pose, matches: Correspondences) -> Judgement:
         weighed.evidence, matches_agreeing=float(match_agreement.agreeing(scene, matches, pose.T))
     )
     probability = weighed.confidence if pose.found else 0.0
-    if scene.explanations:
+    twice = shared_points(scene.pair, pose.T, tolerance(scene.pair.source, scene.pair.target).metres)
+    explanations = [*scene.explanations, *([twice] if twice else [])]
+    if explanations:
         probability = min(probability, DOUBTED)
     why = reasons(
         evidence,
@@ -81,14 +85,14 @@ def judge(scene: Scene, pose: Pose, matches: Correspondences) -> Judgement:
         weighed.doubts,
         found=pose.found,
         unseen=_unseen(scene),
-        explained=bool(scene.explanations),
+        explained=bool(explanations),
         started=scene.pair.placed is not None,
         drawn=weighed.drawn,
     )
     return Judgement(
         verdict=word(probability),
         confidence=probability,
-        reasons=(*scene.explanations, *why, *_by_bounds(scene, weighed.shut_out)),
+        reasons=(*explanations, *why, *_by_bounds(scene, weighed.shut_out)),
         evidence=evidence.as_dict(),
         overlay=Overlay(scene.pair.source.points, scene.pair.target.points, pose.T, 2.0 * scene.spacing),
         information=weighed.at.information.matrix,
