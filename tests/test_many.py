@@ -19,6 +19,7 @@ from hybridreg.data.hard import box_world
 from hybridreg.geometry import se3
 from hybridreg.geometry.voxel_cells import voxel_centroids
 from hybridreg.io import write_points
+from hybridreg.many import batch_run, kept_rows
 from hybridreg.many.jobs import jobs_of
 
 
@@ -231,3 +232,14 @@ def test_clouds_of_a_batch_are_named_one_by_one_or_by_patterns(tmp_path: Path) -
     assert [job.id for job in jobs_of([pattern + ".csv"], target)] == ["s9", "s10", "s[1]"]
     named = [str(tmp_path / "s[1].csv"), str(tmp_path / "s10.csv")]
     assert [job.source for job in jobs_of(named, target)] == named
+
+
+def test_a_map_that_was_written_anew_is_read_anew_in_one_process(tmp_path: Path) -> None:
+    path, settings = str(tmp_path / "map.npy"), json.dumps({"nonfinite": "raise", "target_viewpoint": "none"})
+    rng = np.random.default_rng(0)
+    read = []
+    for n in (300, 400):
+        np.save(path, rng.uniform(-9.0, 9.0, (n, 3)))
+        read.append(batch_run._target(path, kept_rows.looks(path), settings))
+    assert read[0] is not read[1]
+    assert batch_run._target(path, kept_rows.looks(path), settings) is read[1]

@@ -68,7 +68,7 @@ def control_of(entry: Entry) -> Control | None:
     spec: Mapping[str, Any] = entry.config.get("method", {})
     if not set(SLOTS) <= set(spec):
         return None
-    pipeline = Pipeline(**{slot: spec[slot] for slot in SLOTS})
+    pipeline = Pipeline(**{part: spec[part] for part in (*SLOTS, "prior") if part in spec})
     told = value_of(Mapping[str, Any], spec.get("control", {}), f"{entry.name}: control")
     unknown = set(told) - {"oracle", "image"}
     if unknown:

@@ -141,7 +141,7 @@ def _pipeline(settings: str) -> Pipeline:
 
 
 @lru_cache(maxsize=1)
-def _target(path: str, settings: str) -> Target:
+def _target(path: str, seen: str | None, settings: str) -> Target:  # `seen`: it may change under its name
     told = json.loads(settings)
     return Target(path, nonfinite=told["nonfinite"], viewpoint=told["target_viewpoint"])
 
@@ -158,7 +158,7 @@ def _one(job: Job, settings: str) -> Row:
     told = json.loads(settings)
     try:
         source = PointCloud.of(job.source, name="source", nonfinite=told["nonfinite"])
-        pair = Pair.of(source, _target(job.target, settings), id=job.id)
+        pair = Pair.of(source, _target(job.target, row["files"][1], settings), id=job.id)
         result = _pipeline(settings).run(pair, seed=told["seed"])
     except (ValueError, OSError, MemoryError) as error:
         return {

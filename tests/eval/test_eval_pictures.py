@@ -16,6 +16,7 @@ from hybridreg import testing
 from hybridreg.eval import PROTOCOLS, table_run
 from hybridreg.eval.report import cloud_pictures, rerun_for_pictures, stage_pictures
 from hybridreg.eval.run.controls import Control
+from hybridreg.eval.scored_table import Entry
 from hybridreg.eval.table_file import Line, Recipe
 from hybridreg.geometry import se3
 from hybridreg.matches import Correspondences, Overlap
@@ -139,3 +140,10 @@ def test_map_returns_far_away_do_not_shrink_the_scene() -> None:
     stray = np.vstack([near, [[900.0, 900.0, 0.0]]])
     low, high = cloud_pictures.window(stray)
     assert np.all(high - low < 30.0)
+
+
+def test_what_was_known_beforehand_is_known_again_when_pictures_are_drawn() -> None:
+    pipeline = hr.Pipeline(voxel=0.5, match="none", estimate="identity", prior={"max_rotation": 5.0})
+    again = rerun_for_pictures.control_of(Entry(name="m", rows=[], config={"method": pipeline.to_spec()}))
+    assert again is not None
+    assert again.pipeline == pipeline
