@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # compas 2.15.1 reads a mesh from OBJ with vertices that fall on the same thousandth of the file's unit made one: of a part that was scanned
 # every 0.3 mm and is given in metres about one vertex in ten is left, and as few faces, without a word. The same mesh comes whole out of
-# PLY, OFF and STL. Its `precision`, "of the geometric map that is used to connect the lines", is three digits if nothing is given.
+# PLY and OFF. Its `precision`, "of the geometric map that is used to connect the lines", is three digits if nothing is given.
 #
 # Guess before it was run: its readers of STL, PLY, OFF and OBJ keep the points of the file.
 # For whom it matters: whoever registers a scan to a model by it, or samples a scanned surface: steps of a millimetre, and holes where faces

@@ -4,7 +4,7 @@
 # two scans do, the choice is chance: about half of its matrices are mirrors (determinant -1), which no sensor can have moved by,
 # and few are right. Where the points stand in one order, all are. Nothing is said, and its words ask for no order.
 #
-# Guess before it was run: (its source had been glanced at) a rotation, right to some degrees, whatever the order of the points.
+# Guess before it was run: a rotation, right to some degrees, whatever the order of the points (noted after a glance at its source).
 # For whom it matters: whoever hands its matrix to an ICP, OpenCV's among them, or to a registration as a start: a mirrored start stays
 # mirrored. Try the four signs without a mirror, and keep the one whose nearest points lie closest.
 set -euo pipefail

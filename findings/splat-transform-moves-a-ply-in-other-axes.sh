@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# @playcanvas/splat-transform 3.7.0 moves and turns a PLY file not in the file's axes, but in those of its engine, which stand half a turn
+# splat-transform 3.7.0 (@playcanvas/splat-transform) moves and turns a PLY file not in the file's axes, but in those of its engine, which stand half a turn
 # about z away: `-t 1,2,3` adds (-1, -2, 3) to the points, `-r 90,0,0` turns them by -90 degrees about x. Heights, headings and scales
 # come out as told. Its words are "Translate Gaussians by (x, y, z)", and a PLY that is written again unmoved is the same.
 #

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
-# @playcanvas/splat-transform 3.7.0 leaves `--translate`, `--rotate` and `--scale` out of the CSV files that it writes: their positions are
-# those of the input, without a word. The filters among the same actions see the moved scene: a box keeps the Gaussians that lie in it
-# after the move, and they are written where they lay before.
+# splat-transform 3.7.0 (@playcanvas/splat-transform) leaves `--translate`, `--rotate` and `--scale` out of the CSV files that it writes: their positions are
+# those of the input, without a word. The filters among the same actions see the moved scene: those that lie above a height
+# after the move are kept, and are written where they lay before.
 #
 # Guess before it was run: a CSV file holds the same positions as a PLY file written by the same actions.
 # For whom it matters: whoever takes the middles of Gaussian splats out as CSV, the tool's one text format, to register them as a cloud:

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
-# torch_geometric 2.8.1's `RandomRotate`, `RandomFlip` and `LinearTransformation` turn the positions of a cloud and leave its normals where they
-# were, without a word; its `NormalizeRotation` turns both. A PPF, which no rotation changes, changes by up to half a turn after
-# `RandomRotate`. `PointPairFeatures` looks for the normals under another name (`norm`) than those two (`normal`).
+# torch_geometric 2.8.1 turns the positions of a cloud by `RandomRotate`, `RandomFlip` and `LinearTransformation` and leaves its normals where they
+# were, without a word; its `NormalizeRotation` turns both. A PPF, which no rotation changes, changes by up to a quarter turn after
+# `RandomRotate`. `PointPairFeatures` looks for the normals under another name (`norm`) than `NormalizeRotation` (`normal`).
 #
 # Guess before it was run: normals are turned with the points, and PPF are the same after a rotation.
 # For whom it matters: whoever trains features for registration on turned clouds with normals: the network sees normals of another cloud, and

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# torch_geometric 2.8.1's transform `NormalizeRotation`, documented as "Rotates all points according to the eigenvectors", multiplies by the
+# torch_geometric 2.8.1 documents `NormalizeRotation` as "Rotates all points according to the eigenvectors", and multiplies by the
 # eigenvectors as they come, whose determinant may be -1: it mirrors three of four clouds here, the normals too. (Which ones hangs on the
 # linear algebra below torch.) The signs of the axes are free as well: a thing that was only turned comes out the same one time in seven.
 #
