@@ -78,7 +78,7 @@ def test_the_weights_on_disk_reach_the_figures_of_the_card(whole: Run) -> None:
     )
     for name in ("recall", "rre_deg", "inlier_ratio", "pir", "mask_f1"):
         assert getattr(again, name) == pytest.approx(float(card[name]), rel=1e-4), name
-    assert not network.training
+    assert network.training, "a validation leaves the network ready to go on"
 
 
 def test_weights_can_be_read_by_others(whole: Run) -> None:
