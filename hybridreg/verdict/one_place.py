@@ -33,7 +33,8 @@ def rivalled(at: PoseEvidence, found: list[Hypothesis]) -> Rivalled | None:
     """None where no rival counts, or the pose does not let both clouds be seen from one place."""
     if not at.views.from_one_place(at.T):
         return None
-    counts = [one for one in found if one.by_surfaces > LIKELY or _uncontradicted(one.at)]
+    drawn = at.views.scene.pair.drawn  # of walls drawn through flat scans many poses are likely
+    counts = [one for one in found if (one.by_surfaces > LIKELY and not drawn) or _uncontradicted(one.at)]
     if not counts:
         return None
     centre = se3.apply(at.T, at.views.middle)[0]
