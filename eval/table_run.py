@@ -25,6 +25,7 @@ from hybridreg.pair import LabelledPair
 from hybridreg.runtime import optional_packages
 
 _INDEX = "table.json"
+_PREDICTIONS = "predictions"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -97,7 +98,7 @@ def run(
         )
     vouch(pairs)
     folder = Path(out)
-    (folder / "predictions").mkdir(parents=True, exist_ok=True)
+    (folder / _PREDICTIONS).mkdir(parents=True, exist_ok=True)
     with folder_lock(folder):
         return _run(recipe, pairs, folder, data, workers, overwrite, on_row)
 
@@ -233,12 +234,26 @@ def _entry(name: str, path: Path) -> Entry:
     return Entry(name=name, rows=read.rows, config=read.config)
 
 
+def files_in(path: Path) -> list[Path]:
+    """The predictions in a folder that `run` wrote; of a file that itself.
+
+    Raises
+    ------
+    ValueError
+        The folder holds none.
+    """
+    found = sorted((path / _PREDICTIONS).glob("*.jsonl")) if path.is_dir() else [path]
+    if not found:
+        raise ValueError(f"{path}: holds no predictions; give a folder that `hybridreg eval` wrote")
+    return found
+
+
 def _names(paths: Sequence[Path]) -> list[str]:
     # As short as they differ: the file's name, that and the run's folder, the whole path.
     own = [
         path.name if path.stem == IDENTITY else path.stem for path in paths
     ]  # the table has a row of that name
-    runs = [path.parent.parent if path.parent.name == "predictions" else path.parent for path in paths]
+    runs = [path.parent.parent if path.parent.name == _PREDICTIONS else path.parent for path in paths]
     for names in (own, [f"{run.name}/{name}" for run, name in zip(runs, own, strict=True)]):
         if len(set(names)) == len(names):
             return names
@@ -253,4 +268,4 @@ def _with_identity(entries: list[Entry]) -> list[Entry]:
 
 
 def _file(folder: Path, name: str) -> Path:
-    return folder / "predictions" / f"{slug(name)}.jsonl"
+    return folder / _PREDICTIONS / f"{slug(name)}.jsonl"

@@ -17,7 +17,7 @@ from hybridreg.data.hard import box_world
 from hybridreg.data.loaders.folder import load_pair
 from hybridreg.geometry import se3
 from hybridreg.many import link_search
-from hybridreg.many.alignment_words import against_cloud
+from hybridreg.many.alignment_words import against_clouds
 from hybridreg.many.links import Link, best_tree, groups, placed
 from hybridreg.many.other_ways import elsewhere
 from hybridreg.runtime.open3d import load_open3d
@@ -303,7 +303,7 @@ def test_what_is_said_of_a_cloud_is_not_said_of_one_whose_name_begins_alike() ->
         seconds=0.0,
     )
     assert found.n_links.tolist() == [2, 1, 1]
-    assert [list(against_cloud(found, row)) for row in range(3)] == [
+    assert against_clouds(found) == [
         [],
         ["scan hangs on one link, which nothing confirms"],
         ["scan (2) hangs on one link, which nothing confirms"],
@@ -337,7 +337,7 @@ def test_doubtful_links_between_two_groups_confirm_nothing_however_many(
     assert found.doubted == doubted
     assert found.verdict == "doubtful"
     for row in range(8):
-        told = " ".join(against_cloud(found, row))
+        told = " ".join(against_clouds(found)[row])
         assert ("only doubtful links" in told) == (row in doubted)
     one_ok = [replace(link, verdict="ok") if {link.source, link.target} == {4, 5} else link for link in links]
     assert replace(found, links=tuple(one_ok)).verdict == "ok"

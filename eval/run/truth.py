@@ -29,11 +29,11 @@ def row(index: int, labelled: LabelledPair, tried: Attempt, match: Any = None) -
     ``match`` is the pipeline's match stage, which tells where it cuts the mask, and matches without its filters.
     """
     pair = labelled.pair
-    cut = mask_threshold(match)
+    cut, found = mask_threshold(match), _lowered(tried.T, pair)
     return Row(
         index=index,
         id=pair.id,
-        T=_lowered(tried.T, pair),
+        T=found,
         T_estimated=_lowered(tried.T_estimated, pair),
         error=tried.error,
         seconds=tried.seconds,
@@ -42,7 +42,7 @@ def row(index: int, labelled: LabelledPair, tried: Attempt, match: Any = None) -
         T_true=_lowered(labelled.T_target_source, pair),
         offsets=_offsets(pair),
         **_judged(tried),
-        **_overlap(labelled, tried.T),
+        **_overlap(labelled, found),
         **_matched(tried.matches, _before_filters(tried.trace, match), labelled),
         mask=None if tried.trace is None else _mask(tried.trace, labelled, cut),
         mask_threshold=cut,
@@ -105,12 +105,12 @@ def _level_sizes(trace: Trace | None) -> dict[str, int]:
     return {"source_level": len(trace.scene.source), "target_level": len(trace.scene.target)}
 
 
-def _overlap(labelled: LabelledPair, found: Any) -> dict[str, Any]:
+def _overlap(labelled: LabelledPair, found: Matrix | None) -> dict[str, Any]:
     # The radius comes from the clouds alone, so that every method is measured on the same points.
     pair = labelled.pair
     radius = default_voxel(pair.source, pair.target)
     sample = pair.source.points[:: max(1, len(pair.source) // _SAMPLE)]
-    true, own = se3.apply(lower_pose(labelled.T_target_source, pair), sample), _moved(found, sample, pair)
+    true, own = se3.apply(lower_pose(labelled.T_target_source, pair), sample), _moved(found, sample)
     both = true if own is None else np.concatenate([true, own])
     hit = near(both, pair.target.points, radius).reshape(-1, len(sample))
     common = sample[hit[0]]
@@ -122,12 +122,12 @@ def _overlap(labelled: LabelledPair, found: Any) -> dict[str, Any]:
     }
 
 
-def _moved(T: Any, points: metrics.Array, pair: Pair) -> metrics.Array | None:
-    # None for what is no pose, or one of absurd numbers.
-    if matrix(T) is None:
+def _moved(T: Matrix | None, points: metrics.Array) -> metrics.Array | None:
+    # None where there is no pose, or one of absurd numbers.
+    if T is None:
         return None
     with np.errstate(over="ignore", invalid="ignore"):
-        moved = se3.apply(lower_pose(np.asarray(T, dtype=np.float64), pair), points)
+        moved = se3.apply(np.array(T), points)
     return moved if np.isfinite(moved).all() else None
 
 

@@ -41,24 +41,16 @@ def command(
     if folder is not None:
         done, names = table_run.load(folder), list(table_run.read_index(folder).protocols)
     else:
-        done, names = table_run.of_files(_files(paths)), ["cross3dreg", "kitti"]
+        done, names = (
+            table_run.of_files([file for path in paths for file in table_run.files_in(path)]),
+            ["cross3dreg", "kitti"],
+        )
     chosen = [protocol(name) for name in protocols or names]
     written, pairs = out or folder or Path("runs/report"), _data(done, data)
     outputs.check_folder(written)
     table_running.write(done, chosen, written, pairs)
     if pictures:
         _draw(done, chosen[0], pairs, written / "pictures", pictures)
-
-
-def _files(paths: Sequence[Path]) -> list[Path]:
-    # Of folders that `eval` or `table` wrote, their predictions.
-    files = []
-    for path in paths:
-        found = sorted((path / "predictions").glob("*.jsonl")) if path.is_dir() else [path]
-        if not found:
-            raise ValueError(f"{path}: holds no predictions; give a folder that `hybridreg eval` wrote")
-        files.extend(found)
-    return files
 
 
 def _draw(done: Table, chosen: Protocol, pairs: Sequence[LabelledPair] | None, folder: Path, n: int) -> None:

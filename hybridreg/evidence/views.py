@@ -71,6 +71,11 @@ class View:
     thickness: float
     centre: Array
 
+    @property
+    def upward(self) -> Array:
+        """The vertical (3,) in the cloud's frame; its z where no ground shows it."""
+        return np.array([0.0, 0.0, 1.0]) if self.ground is None else self.ground.up
+
     def facing(self, rows: NDArray[np.int64]) -> Array:
         """Normals (k, 3) of some points."""
         return self.normals[rows]

@@ -21,21 +21,26 @@ def reasons(found: Alignment) -> Iterator[str]:
             )
         if link.role == "contradicts":
             yield f"{pair} ({link.verdict}) contradicts the other links and was left out"
-    for row in range(len(found.names)):
-        yield from against_cloud(found, row)
+    for told in against_clouds(found):
+        yield from told
 
 
-def against_cloud(found: Alignment, row: int) -> Iterator[str]:
-    """Against where the cloud in a row lies."""
-    name, reference = found.names[row], found.names[found.reference]
-    if not found.placed[row]:
-        yield f"{name} is not placed: nothing ties it to {reference}"
-    if row in found.hanging:
-        yield f"{name} hangs on one link, which nothing confirms"
-    if row in found.doubted:
-        yield (
-            f"only doubtful links, or given ones that the clouds do not confirm, join {name} to {reference}: register "
-            "it with one of those, and read the reasons"
-        )
-    if row in found.unsure:
-        yield f"{name} may lie elsewhere: with rivals of doubtful links as many agree"
+def against_clouds(found: Alignment) -> list[list[str]]:
+    """Against where each cloud lies, a list a row."""
+    placed, hanging, doubted = found.placed, found.hanging, found.doubted
+    reference = found.names[found.reference]
+
+    def told(row: int, name: str) -> Iterator[str]:
+        if not placed[row]:
+            yield f"{name} is not placed: nothing ties it to {reference}"
+        if row in hanging:
+            yield f"{name} hangs on one link, which nothing confirms"
+        if row in doubted:
+            yield (
+                f"only doubtful links, or given ones that the clouds do not confirm, join {name} to {reference}: "
+                "register it with one of those, and read the reasons"
+            )
+        if row in found.unsure:
+            yield f"{name} may lie elsewhere: with rivals of doubtful links as many agree"
+
+    return [list(told(row, name)) for row, name in enumerate(found.names)]

@@ -20,7 +20,7 @@ from hybridreg.io.csv_cells import csv_text
 from hybridreg.io.lock import folder_lock
 from hybridreg.io.write import write_json
 from hybridreg.many.alignment import Alignment
-from hybridreg.many.alignment_words import against_cloud
+from hybridreg.many.alignment_words import against_clouds
 from hybridreg.many.file_patterns import files_named
 from hybridreg.many.link_file import LinkFile
 from hybridreg.many.link_search import aligned
@@ -158,10 +158,12 @@ def _row_of(reference: str | None, names: Sequence[str], files: Sequence[str]) -
 
 def _table(found: Alignment, files: Sequence[str]) -> str:
     rows = [["id", "file", "placed", "links", "x", "y", "z", "qx", "qy", "qz", "qw", "why"]]
+    links, why = found.n_links, against_clouds(found)
     for row, (name, T, placed) in enumerate(zip(found.names, found.poses, found.placed, strict=True)):
         pose = position_and_quaternion(T) if placed else [""] * 7
-        why = "; ".join(against_cloud(found, row))
-        rows.append([name, files[row], "yes" if placed else "no", str(found.n_links[row]), *pose, why])
+        rows.append(
+            [name, files[row], "yes" if placed else "no", str(links[row]), *pose, "; ".join(why[row])]
+        )
     return csv_text(rows)
 
 

@@ -14,8 +14,8 @@ import pytest
 from eval_stubs import Moody, RowByRow, Scattered, kabsch
 
 from hybridreg.cloud import PointCloud
+from hybridreg.config.changed_settings import differences
 from hybridreg.eval import predict, protocol, read, score
-from hybridreg.eval.run.store import differences
 from hybridreg.eval.score import metrics
 from hybridreg.frames import lower_pose
 from hybridreg.geometry import se3

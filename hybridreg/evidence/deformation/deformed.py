@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -13,6 +13,8 @@ from hybridreg.evidence.surface_distance import Surfaces, one_way
 from hybridreg.evidence.views import View, Views
 from hybridreg.geometry import se3
 from hybridreg.geometry.point_to_plane import jacobian
+from hybridreg.resolution import Tolerance
+from hybridreg.scene import Side
 
 Array = NDArray[np.float64]
 # Displacements (k, n, 3) of points (n, 3), by one unit of each of k amounts.
@@ -51,6 +53,17 @@ class Onto(NamedTuple):
         """The target is moved."""
         source, target = views.fine
         return cls(views.target, views.source, target, source, views.spacing)
+
+    @classmethod
+    def both_ways(cls, views: Views, T_target_source: Array) -> Iterator[tuple[Side, Onto, Array]]:
+        """Which cloud is moved, and the pose (4, 4) that moves it."""
+        yield "source", cls.target(views), T_target_source
+        yield "target", cls.source(views), se3.inverse(T_target_source)
+
+    def moved_off(self, T: Array, other: Array) -> Tolerance:
+        """How far one pose (4, 4) lays the middle of the moved cloud from where another does."""
+        middle = self.moved.points.mean(axis=0, keepdims=True)
+        return Tolerance.between(T, other, se3.apply(T, middle)[0])
 
 
 class Deformed(NamedTuple):

@@ -84,16 +84,8 @@ class MotionDistortion(NamedTuple):
 def motion_distortion(views: Views, T_target_source: Array) -> MotionDistortion | None:
     """The motion about a pose (4, 4) of the sensor that moved more clearly; None where neither did, or where it is not
     known that one sensor took a cloud from one place."""
-    T_source_target = se3.inverse(T_target_source)
-    found = [
-        one
-        for one in (
-            _moved(views, Onto.target(views), "source", T_target_source),
-            _moved(views, Onto.source(views), "target", T_source_target),
-        )
-        if one is not None
-    ]
-    return max(found, key=lambda one: one.gain, default=None)
+    tried = (_moved(views, onto, side, T) for side, onto, T in Onto.both_ways(views, T_target_source))
+    return max((one for one in tried if one is not None), key=lambda one: one.gain, default=None)
 
 
 def _moved(views: Views, onto: Onto, side: Side, T: Array) -> MotionDistortion | None:
@@ -110,8 +102,7 @@ def _moved(views: Views, onto: Onto, side: Side, T: Array) -> MotionDistortion |
     if gain < _GAIN or turn > _MOST_RAD or metres > _MOST_METRES or _share_near(onto, found, field) < _NEAR:
         return None
     pair = views.scene.pair
-    middle = onto.moved.points.mean(axis=0, keepdims=True)
-    off = Tolerance.between(T, found.T, se3.apply(T, middle)[0])
+    off = onto.moved_off(T, found.T)
     half = Tolerance(float(np.degrees(turn)) / 2.0, metres / 2.0)
     allowed = tolerance(pair.source, pair.target)
     return MotionDistortion(
@@ -165,7 +156,7 @@ def _promising(onto: Onto, T: Array) -> list[Field]:
 def _field(view: View, start: float) -> Field:
     """Displacements of points by a turn of one radian, and by a metre along either level direction, during a sweep that
     begins in a direction of `start` radians and goes once around; none in the middle of the sweep."""
-    up = np.array([0.0, 0.0, 1.0]) if view.ground is None else view.ground.up
+    up = view.upward
     along, across, _ = se3.turn_to_z(up)
 
     def field(points: Array) -> Array:

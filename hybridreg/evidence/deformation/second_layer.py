@@ -49,9 +49,8 @@ class SecondLayer(NamedTuple):
 def second_layer(views: Views, T_target_source: Array) -> SecondLayer | None:
     """The one about a pose (4, 4), of either cloud; None where there is none beyond the tolerance."""
     allowed = tolerance(views.scene.pair.source, views.scene.pair.target)
-    return _of("source", Onto.target(views), T_target_source, allowed) or _of(
-        "target", Onto.source(views), se3.inverse(T_target_source), allowed
-    )
+    tried = (_of(side, onto, T, allowed) for side, onto, T in Onto.both_ways(views, T_target_source))
+    return next((one for one in tried if one is not None), None)
 
 
 def _of(side: Side, onto: Onto, T: Array, allowed: Tolerance) -> SecondLayer | None:
