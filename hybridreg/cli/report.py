@@ -41,10 +41,8 @@ def command(
     if folder is not None:
         done, names = table_run.load(folder), list(table_run.read_index(folder).protocols)
     else:
-        done, names = (
-            table_run.of_files([file for path in paths for file in table_run.files_in(path)]),
-            ["cross3dreg", "kitti"],
-        )
+        files = [file for path in paths for file in table_run.files_in(path)]
+        done, names = table_run.of_files(files), ["cross3dreg", "kitti"]
     chosen = [protocol(name) for name in protocols or names]
     written, pairs = out or folder or Path("runs/report"), _data(done, data)
     outputs.check_folder(written)

@@ -39,6 +39,6 @@ def shared_points(pair: Pair, T_target_source: Array, allowed: float) -> str:
     if not _LEAST <= shared.mean() <= _MOST or np.median(moved[shared]) > _ON_THEMSELVES * allowed:
         return ""
     return (
-        f"{shared.mean():.0%} of the source's points are points of the target, to the last bit, and the pose lays them on "
-        "themselves: does a buffer still hold another scan, or was something drawn into both? Leave those points out"
+        f"{shared.mean():.0%} of the source's points are points of the target, to the last bit, and the pose lays them "
+        "on themselves: does a buffer still hold another scan, or was something drawn into both? Leave those points out"
     )
