@@ -34,15 +34,15 @@ def command(
 ) -> None:
     """Write the reports of a table again, under any protocol."""
     from hybridreg.cli import table_running
-    from hybridreg.eval import table_run
+    from hybridreg.eval import stored_table
     from hybridreg.eval.score.protocols import protocol
 
     folder = paths[0] if len(paths) == 1 and paths[0].is_dir() else None
     if folder is not None:
-        done, names = table_run.load(folder), list(table_run.read_index(folder).protocols)
+        done, names = stored_table.load(folder), list(stored_table.read_index(folder).protocols)
     else:
-        files = [file for path in paths for file in table_run.files_in(path)]
-        done, names = table_run.of_files(files), ["cross3dreg", "kitti"]
+        files = [file for path in paths for file in stored_table.files_in(path)]
+        done, names = stored_table.of_files(files), ["cross3dreg", "kitti"]
     chosen = [protocol(name) for name in protocols or names]
     written, pairs = out or folder or Path("runs/report"), _data(done, data)
     outputs.check_folder(written)

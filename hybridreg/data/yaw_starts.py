@@ -6,7 +6,7 @@ from __future__ import annotations
 import dataclasses
 import re
 import zlib
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
@@ -55,6 +55,11 @@ class YawStarts(Dataset):
 def start_of(name: str) -> str:
     """Name of the pair that a start of this name was made from; of any other pair its own."""
     return re.sub(r"@yaw\d+$", "", name)
+
+
+def starts_in(names: Iterable[str]) -> int:
+    """How many starts each pair was given, by the names of all of them."""
+    return max((int(found[1]) for name in names if (found := re.search(r"@yaw(\d+)$", name))), default=0)
 
 
 def yaw_starts(pairs: Sequence[LabelledPair], n: int = 3, seed: int = 0) -> YawStarts:

@@ -19,7 +19,7 @@ from hybridreg import testing
 from hybridreg.candidates.candidates import Candidates
 from hybridreg.classical import kiss
 from hybridreg.cli.app import app
-from hybridreg.eval import table_file, table_run
+from hybridreg.eval import stored_table, table_file, table_run
 from hybridreg.eval.run import prediction
 from hybridreg.io import write_json, write_points
 from hybridreg.pair import LabelledPair
@@ -65,7 +65,7 @@ def test_a_line_whose_package_is_missing_was_not_run(
     done = table_run.run(table_file.parse(ROWS), pairs, tmp_path, workers=1)
     assert [entry.name for entry in done.methods] == ["icp"]
     assert "kiss-matcher" in done.problems["kiss-gicp"]
-    assert table_run.load(tmp_path).problems == done.problems
+    assert stored_table.load(tmp_path).problems == done.problems
     from hybridreg.eval.report import table_report
 
     for file in table_report.write(done, table_file.parse(ROWS).protocols, tmp_path, pairs):

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 from eval_stubs import Scattered
 
-from hybridreg.eval import table_file, table_run
+from hybridreg.eval import stored_table, table_file, table_run
 from hybridreg.eval.report import formats, table_report
 from hybridreg.eval.score import paper
 from hybridreg.io import shipped_weights
@@ -25,7 +25,7 @@ STILL = {"voxel": 0.5, "match": "none", "estimate": "identity", "refine": "none"
 
 def test_printed_figures_are_a_table_of_their_own(tmp_path: Path) -> None:
     read = table_file.parse({"base": STILL, "row": [{"name": "ours"}], "paper": PRINTED})
-    done = table_run.load(table_folder(read, tmp_path))
+    done = stored_table.load(table_folder(read, tmp_path))
     assert done.paper == paper.parse(PRINTED)
     text = formats.markdown(done, read.protocols)
     ours, theirs = text.split("## As printed in a paper, measured on their data: not comparable")

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from eval_stubs import Moody, RowByRow, Scattered, row
 
-from hybridreg.eval import PROTOCOLS, read, table_run
+from hybridreg.eval import PROTOCOLS, read, stored_table, table_run
 from hybridreg.eval.report import formats, plotly_figures, table_report
 from hybridreg.eval.report.line_styles import styles
 from hybridreg.eval.run.row import Row
@@ -67,7 +67,7 @@ def test_running_again_runs_nothing(ran: tuple[Table, Path]) -> None:
     table_run.run(RECIPE, Scattered(3), out, data="scattered", on_row=lambda name, r: heard.append((name, r)))
     assert (out / "predictions" / "exact.jsonl").read_bytes() == before
     assert [name for name, _ in heard] == ["exact"] * 6 + ["moody_<b>"] * 6
-    again = table_run.load(out)
+    again = stored_table.load(out)
     assert [entry.rows for entry in again.entries] == [entry.rows for entry in done.entries]
 
 
@@ -81,23 +81,42 @@ def test_a_changed_line_is_refused(ran: tuple[Table, Path]) -> None:
 def test_files_of_the_same_data_make_a_table(ran: tuple[Table, Path], tmp_path: Path) -> None:
     _, out = ran
     files = [out / "predictions" / name for name in ("moody-b.jsonl", "exact.jsonl")]
-    assert [entry.name for entry in table_run.of_files(files).entries] == ["identity", "moody-b", "exact"]
+    assert [entry.name for entry in stored_table.of_files(files).entries] == ["identity", "moody-b", "exact"]
     again = tmp_path / "again" / "predictions" / "exact.jsonl"
     again.parent.mkdir(parents=True)
     again.write_bytes(files[1].read_bytes())
-    both = table_run.of_files([files[1], again])
+    both = stored_table.of_files([files[1], again])
     assert [entry.name for entry in both.methods] == [f"{out.name}/exact", "again/exact"]
     own = tmp_path / "identity.jsonl"
     own.write_bytes(files[0].read_bytes())
-    assert [entry.name for entry in table_run.of_files([own]).entries] == ["identity", "identity.jsonl"]
+    assert [entry.name for entry in stored_table.of_files([own]).entries] == ["identity", "identity.jsonl"]
     table_run.run(dataclasses.replace(RECIPE, starts=0), Scattered(2), tmp_path, data="scattered")
     with pytest.raises(ValueError, match="of other data"):
-        table_run.of_files([files[0], tmp_path / "predictions" / "exact.jsonl"])
+        stored_table.of_files([files[0], tmp_path / "predictions" / "exact.jsonl"])
+
+
+def test_compared_files_tell_of_their_starts(ran: tuple[Table, Path]) -> None:
+    done, out = ran
+    compared = stored_table.of_files(stored_table.files_in(out))
+    assert compared.starts == done.starts == 1
+    assert "3 pairs, each as it is and under 1 random yaw rotation, 6 runs" in compared.caption(CROSS)
+
+
+def test_another_run_in_one_folder_tells_of_the_lines_it_no_longer_shows(tmp_path: Path) -> None:
+    one, two = (dataclasses.replace(RECIPE, lines=(line,)) for line in RECIPE.lines[:2])
+    table_run.run(one, Scattered(2), tmp_path, data="scattered")
+    with pytest.warns(
+        UserWarning, match=r"held a table with exact, .*report .*exact\.jsonl .*moody-b\.jsonl"
+    ):
+        table_run.run(two, Scattered(2), tmp_path, data="scattered")
+    # What an earlier table left beside it is no part of this one.
+    assert [path.name for path in stored_table.files_in(tmp_path)] == ["moody-b.jsonl"]
+    assert (tmp_path / "predictions" / "exact.jsonl").is_file()
 
 
 def test_a_folder_without_a_table_says_so(tmp_path: Path) -> None:
     with pytest.raises(FileNotFoundError, match="no table was run there"):
-        table_run.load(tmp_path)
+        stored_table.load(tmp_path)
 
 
 def test_caption_names_data_starts_and_protocol(ran: tuple[Table, Path]) -> None:
@@ -289,7 +308,7 @@ def test_scoring_again_needs_only_the_file(ran: tuple[Table, Path]) -> None:
     stored = read(out / "predictions" / "exact.jsonl")
     assert stored.config["method"]["estimate"]["stage"] == "row-by-row"
     again: dict[str, Any] = {
-        name: table_run.load(out).scores(p)["exact"].recall for name, p in PROTOCOLS.items()
+        name: stored_table.load(out).scores(p)["exact"].recall for name, p in PROTOCOLS.items()
     }
     assert again == dict.fromkeys(PROTOCOLS, 1.0)
 

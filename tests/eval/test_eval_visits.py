@@ -11,7 +11,7 @@ import pytest
 from eval_stubs import Scattered
 
 import hybridreg as hr
-from hybridreg.eval import table_file, table_run
+from hybridreg.eval import stored_table, table_file, table_run
 from hybridreg.eval.report import formats
 from hybridreg.eval.run.controls import Control
 from hybridreg.eval.scored_table import Table
@@ -52,7 +52,7 @@ def test_every_format_has_the_column_where_a_method_learned(
     told = iter((39_800, None))
     monkeypatch.setattr(shipped_weights, "visits_of", lambda _: next(told))
     table_run.run(read, Scattered(1), tmp_path, data="scattered")
-    done = table_run.load(tmp_path)
+    done = stored_table.load(tmp_path)
     assert done.visits == {"learned": 39_800}
     results = formats.tables(done, read.protocols[0])["Results"]
     assert [line["visits"] for line in results] == ["–", "39,800", "–"]
@@ -67,7 +67,7 @@ def test_every_format_has_the_column_where_a_method_learned(
 def test_a_table_of_methods_that_learn_nothing_has_no_such_column(tmp_path: Path) -> None:
     read = table_file.parse({"base": STILL, "row": [{"name": "by hand"}]})
     table_run.run(read, Scattered(1), tmp_path, data="scattered")
-    done: Table = table_run.load(tmp_path)
+    done: Table = stored_table.load(tmp_path)
     assert all("visits" not in line for line in formats.tables(done, read.protocols[0])["Results"])
     assert "isits" not in formats.markdown(done, read.protocols)
     assert "visits" not in formats.table_csv(done, read.protocols)

@@ -19,7 +19,7 @@ from hybridreg import Pipeline, PointCloud, changes, registry, spec
 from hybridreg.classical.overhead import sweep as sweep_module
 from hybridreg.classical.overhead.overhead_columns import Columns, FromAbove
 from hybridreg.data.loaders.folder import load_pair
-from hybridreg.eval import table_file, table_run
+from hybridreg.eval import stored_table, table_file
 from hybridreg.eval.run.store import read
 from hybridreg.geometry import se3
 from hybridreg.io import read_points, write_json, write_points
@@ -283,16 +283,16 @@ def test_a_table_without_a_row_yet(tmp_path: Path) -> None:
     whole = StoredCase(file=FILES[0], line=0).content()
     (tmp_path / "p.jsonl").write_bytes(whole[: whole.index(b"\n") + 1])
     with pytest.raises(ValueError, match="no rows yet"):
-        table_run.of_files([tmp_path / "p.jsonl"])
+        stored_table.of_files([tmp_path / "p.jsonl"])
 
 
 @pytest.mark.filterwarnings("error")
 def test_poses_beyond_any_world_are_no_rows(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match=r"line 2: not a row of predictions: T: the last row"):
-        table_run.of_files([_with_pose(tmp_path, np.full((4, 4), 1e300).tolist())])
+        stored_table.of_files([_with_pose(tmp_path, np.full((4, 4), 1e300).tolist())])
     far = np.eye(4)
     far[:3, 3] = 1e300
-    whole = table_run.of_files([_with_pose(tmp_path, far.tolist())])
+    whole = stored_table.of_files([_with_pose(tmp_path, far.tolist())])
     assert whole.scores(hr.eval.protocol("cross3dreg"))["p"].recall < 1.0
 
 

@@ -22,7 +22,7 @@ from hybridreg.data import open_dataset
 from hybridreg.data.lists.pickles import read_pickle
 from hybridreg.data.lists.pth import read_pth
 from hybridreg.data.simulate.simulated_folder import read_pair
-from hybridreg.eval import PROTOCOLS, table_file, table_run
+from hybridreg.eval import PROTOCOLS, stored_table, table_file, table_run
 from hybridreg.eval.report import table_report
 from hybridreg.eval.report.rerun_for_pictures import redraw
 from hybridreg.io import read_image, read_points, write_points
@@ -221,7 +221,7 @@ def test_stored_predictions_are_drawn_again_by_registered_stages_alone(
     else:
         content["config"]["method"]["control"] = control
     (tmp_path / "p.jsonl").write_text("\n".join([json.dumps(content), *rows]) + "\n")
-    done = table_run.of_files([tmp_path / "p.jsonl"])
+    done = stored_table.of_files([tmp_path / "p.jsonl"])
     with pytest.raises((ValueError, KeyError)):
         redraw(done, PROTOCOLS["cross3dreg"], [], tmp_path / "pictures", 1)
     assert not mark.exists()
@@ -240,9 +240,9 @@ def test_a_report_holds_no_markup_of_the_predictions(tmp_path: Path, text: str) 
         row["id"] = f"{text}{i}"
     path = tmp_path / "p.jsonl"
     path.write_text("\n".join(json.dumps(each) for each in (content, *stored)) + "\n")
-    done = table_run.of_files([path])
-    renamed = table_run.Entry(name=text, rows=done.methods[0].rows, config=done.methods[0].config)
-    hostile = table_run.Table(title=text, data=text, seed=0, starts=0, entries=[done.entries[0], renamed])
+    done = stored_table.of_files([path])
+    renamed = stored_table.Entry(name=text, rows=done.methods[0].rows, config=done.methods[0].config)
+    hostile = stored_table.Table(title=text, data=text, seed=0, starts=0, entries=[done.entries[0], renamed])
     table_report.write(hostile, [PROTOCOLS["cross3dreg"]], tmp_path / "report")
     assert text not in (tmp_path / "report" / "report.html").read_text(encoding="utf-8")
 

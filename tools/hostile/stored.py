@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 
 from hybridreg import Pipeline
 from hybridreg.data import open_dataset
-from hybridreg.eval import PROTOCOLS, predict, table_run
+from hybridreg.eval import PROTOCOLS, predict, stored_table, table_run
 from hybridreg.eval.report import table_report
 from hybridreg.eval.run import store
 from hybridreg.eval.table_file import parse
@@ -100,7 +100,7 @@ def _recipe() -> Any:
 
 
 def _predictions(folder: Path) -> str:
-    done = table_run.of_files([folder / FILES[0]])
+    done = stored_table.of_files([folder / FILES[0]])
     table_report.write(done, list(PROTOCOLS.values())[:2], folder / "report")
     pairs = open_dataset(folder / "data")
     read = store.read(folder / FILES[0]).rows
@@ -111,7 +111,7 @@ def _predictions(folder: Path) -> str:
 
 
 def _index(folder: Path) -> str:
-    table_report.write(table_run.load(folder), [PROTOCOLS["cross3dreg"]], folder / "report")
+    table_report.write(stored_table.load(folder), [PROTOCOLS["cross3dreg"]], folder / "report")
     return "scored"
 
 
