@@ -23,6 +23,11 @@ def raise_pose(T: Array, pair: Pair) -> Array:
     return raised if pair.placed is None else pair.placed.raised(raised)
 
 
+def start_pose(pair: Pair) -> Array:
+    """Where the source lies before any search, in the user's coordinates: at the given start, otherwise as it came."""
+    return np.eye(4) if pair.placed is None else pair.placed.raised(np.eye(4))
+
+
 def raise_target(points: Array, pair: Pair) -> Array:
     """Places (n, 3) of the target's frame in the user's coordinates."""
     raised = points + pair.target.offset

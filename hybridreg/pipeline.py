@@ -14,7 +14,14 @@ from numpy.typing import NDArray
 
 from hybridreg import fitting, presets, spec
 from hybridreg.cloud import PointCloud
-from hybridreg.frames import lower_matches, raise_information, raise_matches, raise_pose, raise_target
+from hybridreg.frames import (
+    lower_matches,
+    raise_information,
+    raise_matches,
+    raise_pose,
+    raise_target,
+    start_pose,
+)
 from hybridreg.geometry.se3 import project
 from hybridreg.io import shipped_weights
 from hybridreg.matches import Correspondences, Overlap, Pose
@@ -201,7 +208,7 @@ class Pipeline(Stage):
             scale_verdict=of_scale(judgement, pair.placed.margin)
             if pair.placed and self.prior.scale
             else None,
-            transformation=raise_pose(trace.refined.T, pair),
+            transformation=raise_pose(trace.refined.T, pair) if trace.refined.found else start_pose(pair),
             rivals=np.array([raise_pose(T, pair) for T in judgement.rivals]).reshape(-1, 4, 4),
             matches=raise_matches(trace.matches, pair),
             verdict=judgement.verdict,

@@ -15,6 +15,7 @@ import hybridreg as hr
 from hybridreg import testing
 from hybridreg.geometry import se3
 from hybridreg.matches import Correspondences, Overlap, Pose
+from hybridreg.prior.prior import Prior
 from hybridreg.scene import Scene
 
 
@@ -348,6 +349,21 @@ def test_only_one_cloud_on_a_map_grid(courtyard: tuple[hr.Pair, np.ndarray]) -> 
     pipe = identity(voxel=0.5)
     result = pipe(pair.source.points, pair.target.points + [4e5, 5e6, 0.0])
     assert np.allclose(result.transformation[:3, 3], [4e5, 5e6, 0.0])
+
+
+def test_where_no_pose_is_found_the_clouds_stay_as_they_came_wherever_they_lie(
+    courtyard: tuple[hr.Pair, np.ndarray],
+) -> None:
+    pair, truth = courtyard
+    pipe = identity(estimate=lambda scene, matches, rng: Pose.unknown(), voxel=0.5)
+    far = pair.target.points + [4e5, 5e6, 0.0]
+    lost = pipe(pair.source.points, far)
+    assert lost.verdict == "failed"
+    assert not lost.found
+    assert np.array_equal(lost.transformation, np.eye(4))
+    start = se3.from_rt(truth[:3, :3], truth[:3, 3] + [4e5, 5e6, 0.0])
+    begun = pipe.replace(prior=Prior(init=start))(pair.source.points, far)
+    assert np.allclose(begun.transformation, start, atol=1e-6)
 
 
 def test_image_is_asked_for_where_a_stage_needs_it(courtyard: tuple[hr.Pair, np.ndarray]) -> None:
