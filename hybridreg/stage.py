@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import dataclasses
+import difflib
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, ClassVar, NoReturn
 
@@ -62,7 +63,8 @@ class Stage:
 
     def replace(self, **changes: Any) -> Self:
         """A copy with some fields changed; `field__name` reaches into a nested stage, as deep as need be."""
-        return dataclasses.replace(self, **own_changes(self, changes))  # type: ignore[type-var]
+        copy: Self = _replaced(self, changes)
+        return copy
 
 
 def own_changes(stage: Any, changes: Mapping[str, Any]) -> dict[str, Any]:
@@ -71,7 +73,10 @@ def own_changes(stage: Any, changes: Mapping[str, Any]) -> dict[str, Any]:
     for key, value in changes.items():
         outer, _, inner = key.partition("__")
         if inner:
-            own[outer] = _with(own.get(outer, getattr(stage, outer)), inner, value, key)
+            if outer not in own and not hasattr(stage, outer):
+                own[outer] = value  # refused by whoever takes the changes, with the names that there are
+                continue
+            own[outer] = _with(own.get(outer, getattr(stage, outer, None)), inner, value, key)
     return own
 
 
@@ -84,7 +89,18 @@ def _with(nested: Any, field: str, value: Any, key: str) -> Any:
         return {**nested, outer: _with(nested.get(outer), inner, value, key) if inner else value}
     if not dataclasses.is_dataclass(nested):
         raise TypeError(f"{key}: {nested!r} has no fields")
-    return dataclasses.replace(nested, **own_changes(nested, {field: value}))  # type: ignore[type-var]
+    return _replaced(nested, {field: value})
+
+
+def _replaced(stage: Any, changes: Mapping[str, Any]) -> Any:
+    own, known = own_changes(stage, changes), list(own_params(stage))
+    for name in own:
+        if name not in known:
+            near = difflib.get_close_matches(name, known, n=1)
+            hint = f"; did you mean {near[0]!r}?" if near else ""
+            has = f"its fields are {', '.join(known)}" if known else "it has none"
+            raise TypeError(f"{type(stage).__name__} has no field {name!r}{hint} ({has})")
+    return dataclasses.replace(stage, **own)
 
 
 def same(one: Any, other: Any) -> bool:

@@ -4,6 +4,7 @@ from __future__ import annotations
 import dataclasses
 import json
 import pickle
+import re
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -250,6 +251,19 @@ def test_a_field_of_a_stage_that_is_named_in_the_same_breath() -> None:
     assert bounded.prior == hr.Pipeline().swap(prior={"max_rotation": 30.0}).prior
     with pytest.raises(TypeError, match="estimate__tries: <function .* has no fields"):
         hr.Pipeline().replace(estimate=lambda *_: None, estimate__tries=3)
+
+
+@pytest.mark.parametrize("changes, words", [
+    ({"refin__iterations": 7}, "no slot is called refin; the slots are downsample"),
+    ({"refin": "icp"}, "no slot is called refin; the slots are downsample"),
+    ({"refine__max_distnces": [1.0]}, "Gicp has no field 'max_distnces'; did you mean 'max_distances'? (its fields"),
+    ({"match__k": 7}, "Fpfh has no field 'k' (its fields are radius, "),
+    ({"overlap__k": 7}, "NoOverlap has no field 'k' (it has none)"),
+])  # fmt: skip
+def test_a_field_that_is_misspelt_is_told_with_those_there_are(changes: dict[str, Any], words: str) -> None:
+    pipe = hr.Pipeline.preset("fpfh-ransac-gicp")
+    with pytest.raises(TypeError, match=re.escape(words)):
+        pipe.replace(**changes)
 
 
 def test_a_file_name_promises_no_other_format(tmp_path: Path) -> None:

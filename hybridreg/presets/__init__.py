@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import difflib
 import os
 from importlib.resources import files
 from pathlib import Path
@@ -27,7 +28,9 @@ def load(name: str) -> dict[str, Any]:
         A name that does not exist; it lists those that do.
     """
     if name not in names():
-        raise KeyError(f"no preset is called {name!r}. Known: {', '.join(names())}")
+        near = difflib.get_close_matches(str(name), names(), n=1)
+        hint = f"; did you mean {near[0]!r}?" if near else "."
+        raise KeyError(f"no preset is called {name!r}{hint} Known: {', '.join(names())}")
     from hybridreg.io.structured import parse_toml
 
     text = files(__name__).joinpath(f"{name}.toml").read_text(encoding="utf-8")

@@ -145,7 +145,7 @@ def test_an_image_and_a_pipeline_file_are_taken(clouds: tuple[str, str], tmp_pat
 @pytest.mark.parametrize(
     ("arguments", "told"),
     [
-        (["--preset", "icq"], "no preset is called 'icq'. Known: "),
+        (["--preset", "icq"], "no preset is called 'icq'; did you mean 'icp'? Known: "),
         (["--set", "match"], "--set match: expected slot=name"),
         (["--set", "refine=icq"], "no refine stage is called 'icq'; did you mean 'icp'? Known: "),
         (["--set", "refine=nearest"], "no refine stage is called 'nearest'. Known: "),
