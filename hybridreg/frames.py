@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybridreg.geometry import se3
-from hybridreg.matches import Correspondences
+from hybridreg.matches import Correspondences, Pose
 from hybridreg.pair import Pair
 
 Array = NDArray[np.float64]
@@ -23,8 +23,11 @@ def raise_pose(T: Array, pair: Pair) -> Array:
     return raised if pair.placed is None else pair.placed.raised(raised)
 
 
-def start_pose(pair: Pair) -> Array:
-    """Where the source lies before any search, in the user's coordinates: at the given start, otherwise as it came."""
+def raise_found(pose: Pose, pair: Pair) -> Array:
+    """The same of a pose that was found; otherwise where the source lay before the search: at the given start, or as
+    it came."""
+    if pose.found:
+        return raise_pose(pose.T, pair)
     return np.eye(4) if pair.placed is None else pair.placed.raised(np.eye(4))
 
 

@@ -12,16 +12,8 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from hybridreg import fitting, presets, spec
+from hybridreg import fitting, frames, presets, spec
 from hybridreg.cloud import PointCloud
-from hybridreg.frames import (
-    lower_matches,
-    raise_information,
-    raise_matches,
-    raise_pose,
-    raise_target,
-    start_pose,
-)
 from hybridreg.geometry.se3 import project
 from hybridreg.io import shipped_weights
 from hybridreg.matches import Correspondences, Overlap, Pose
@@ -208,15 +200,15 @@ class Pipeline(Stage):
             scale_verdict=of_scale(judgement, pair.placed.margin)
             if pair.placed and self.prior.scale
             else None,
-            transformation=raise_pose(trace.refined.T, pair) if trace.refined.found else start_pose(pair),
-            rivals=np.array([raise_pose(T, pair) for T in judgement.rivals]).reshape(-1, 4, 4),
-            matches=raise_matches(trace.matches, pair),
+            transformation=frames.raise_found(trace.refined, pair),
+            rivals=np.array([frames.raise_pose(T, pair) for T in judgement.rivals]).reshape(-1, 4, 4),
+            matches=frames.raise_matches(trace.matches, pair),
             verdict=judgement.verdict,
             confidence=judgement.confidence,
             reasons=judgement.reasons,
             overlay=judgement.overlay,
-            information=raise_information(judgement.information, pair),
-            centre=raise_target(judgement.centre[None], pair)[0],
+            information=frames.raise_information(judgement.information, pair),
+            centre=frames.raise_target(judgement.centre[None], pair)[0],
             evidence=judgement.evidence,
             notes=tuple(trace.scene.notes),
             seconds={step: trace.seconds[step] for step in sorted(trace.seconds, key=in_order)},
@@ -259,7 +251,7 @@ class Pipeline(Stage):
             if matches is None:
                 found = scene.matched(checked("match", self.match, self.match(scene, overlap)))
             else:
-                found = lower_matches(matches, pair)
+                found = frames.lower_matches(matches, pair)
                 check_matches(found, "matches: some were given")
                 found = scene.matched(found)
         estimate = self.estimate if self.prior is None else self.prior.started(self.estimate)
