@@ -13,6 +13,7 @@ from hybridreg.evidence import information, one_thing, traffic
 from hybridreg.evidence.agreement import Agreement, compare
 from hybridreg.evidence.deformation import (
     bend,
+    changed_ground,
     heights,
     motion_distortion,
     scale,
@@ -21,6 +22,7 @@ from hybridreg.evidence.deformation import (
     stretch,
 )
 from hybridreg.evidence.deformation.bend import Bend
+from hybridreg.evidence.deformation.changed_ground import ChangedGround
 from hybridreg.evidence.deformation.deformed import Deformed, Onto, closeness_of
 from hybridreg.evidence.deformation.motion_distortion import MotionDistortion
 from hybridreg.evidence.deformation.scale import Size
@@ -94,6 +96,11 @@ class PoseEvidence:
     def second_layer(self) -> SecondLayer | None:
         """Much of a cloud that lies on the other one elsewhere, if any."""
         return second_layer.second_layer(self.views, self.T)
+
+    @cached_property
+    def changed_ground(self) -> ChangedGround | None:
+        """By how much the ground was raised or lowered between both clouds, if it was."""
+        return changed_ground.changed_ground(self.views, self.T)
 
     def _explained(self, fitted: Array) -> bool:
         # Whether a sensor's offset, or its motion, lets the clouds lie more closely than another

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybridreg.evidence.deformation.bend import Bend
+from hybridreg.evidence.deformation.changed_ground import ChangedGround
 from hybridreg.evidence.deformation.motion_distortion import MotionDistortion
 from hybridreg.evidence.deformation.second_layer import SecondLayer
 from hybridreg.evidence.deformation.sensor_offset import SensorOffset
@@ -27,6 +28,7 @@ def of_deformed_clouds(evidence: Evidence, doubts: Doubts) -> Iterator[str]:
     yield from _in_motion(doubts.motion_distortion)
     yield from _bent(doubts.bend)
     yield from _twice(doubts.second_layer)
+    yield from _raised(doubts.changed_ground)
 
 
 def three(direction: Array) -> str:
@@ -93,4 +95,14 @@ def _twice(layer: SecondLayer | None) -> Iterator[str]:
             f"{layer.share:.0%} of what stands in the {layer.side} lies on the other cloud {layer.metres:.2g} m and "
             f"{layer.degrees:.1f} deg away from the rest: does it hold a place twice, as a map with open loops, is a "
             "sweep put together of two moments, or did much move together?"
+        )
+
+
+def _raised(ground: ChangedGround | None) -> Iterator[str]:
+    if ground:
+        side, other = ("target", "source") if ground.metres > 0.0 else ("source", "target")
+        yield (
+            f"what stands on the ground fits better when the ground of the {side} is taken to lie "
+            f"{abs(ground.metres):.2g} m higher than that of the {other}: was it raised or dug away between the scans "
+            "(snow, earthworks, water)? The pose lays ground on ground; to lay what stands there, leave the ground out"
         )

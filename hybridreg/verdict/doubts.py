@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from hybridreg.evidence import corner, lone_thing, silhouette
 from hybridreg.evidence.covariance import of_information
 from hybridreg.evidence.deformation.bend import Bend
+from hybridreg.evidence.deformation.changed_ground import ChangedGround
 from hybridreg.evidence.deformation.motion_distortion import MotionDistortion
 from hybridreg.evidence.deformation.second_layer import SecondLayer
 from hybridreg.evidence.deformation.sensor_offset import SensorOffset
@@ -69,6 +70,8 @@ class Doubts:
         How far away a part of a map lies better.
     second_layer : SecondLayer or None
         Much of a cloud that lies on the other one elsewhere.
+    changed_ground : ChangedGround or None
+        The ground was raised or lowered between both clouds, against what stands on it.
     traffic : (3,) float64 or None
         Direction along which vehicles alone hold the pose.
     one_thing : (3,) float64 or None
@@ -87,6 +90,7 @@ class Doubts:
     motion_distortion: MotionDistortion | None = None
     bend: Bend | None = None
     second_layer: SecondLayer | None = None
+    changed_ground: ChangedGround | None = None
     traffic: Array | None = None
     one_thing: Array | None = None
 
@@ -104,13 +108,20 @@ class Doubts:
         """Whether a cloud is deformed, so that no pose is right."""
         known = (self.sensor_offset, self.motion_distortion)
         beyond = any(one is not None and one.beyond for one in known)
-        found = any(each is not None for each in (self.stretch, self.bend, self.second_layer))
+        parts = (self.stretch, self.bend, self.second_layer, self.changed_ground)
+        found = any(each is not None for each in parts)
         return found or beyond
 
     def of_pose(self) -> Doubts:
         """Those that are not about a deformed cloud."""
         return replace(
-            self, stretch=None, sensor_offset=None, motion_distortion=None, bend=None, second_layer=None
+            self,
+            stretch=None,
+            sensor_offset=None,
+            motion_distortion=None,
+            bend=None,
+            second_layer=None,
+            changed_ground=None,
         )
 
     @classmethod
@@ -143,6 +154,8 @@ class Doubts:
             second_layer=None if strained else at.second_layer,
             traffic=None if scene.pair.drawn else at.traffic,
         )
+        if not doubts.about_source and not scene.pair.drawn:
+            doubts = replace(doubts, changed_ground=at.changed_ground)
         if scene.pair.drawn or doubts.about_source:  # of a deformed cloud most lies elsewhere
             return doubts
         return replace(doubts, one_thing=at.one_thing)
