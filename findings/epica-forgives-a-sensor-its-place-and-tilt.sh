@@ -52,10 +52,10 @@ write("tilted.tum", place, turn * Rotation.from_euler("y", 5.0, degrees=True))
 print("epica", version("epica"), "evo", version("evo"), "numpy", np.__version__)
 errors = {}
 for name, words in (("aside.tum", "1 m in front of the body"), ("tilted.tum", "tilted by 5 degrees")):
-    ours, told = by_epica(name)
+    counted, told = by_epica(name)
     theirs = [by_evo(name, "trans_part"), by_evo(name, "angle_deg")]
-    errors[name] = ours, theirs
-    print(f"  {words}: epica {ours[0]:.3f} m, {ours[1]:.3f} degrees; evo {theirs[0]:.3f} m, {theirs[1]:.3f} degrees")
+    errors[name] = counted, theirs
+    print(f"  {words}: epica {counted[0]:.3f} m, {counted[1]:.3f} degrees; evo {theirs[0]:.3f} m, {theirs[1]:.3f} degrees")
     print("    epica says:", *told, sep="\n      ")
 assert max(errors["aside.tum"][0] + errors["tilted.tum"][0]) < 0.002, "epica now counts them"
 assert errors["aside.tum"][1][0] > 0.9 and errors["tilted.tum"][1][1] > 4.9
