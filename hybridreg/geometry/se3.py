@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import inspect
 from collections import UserList
 from typing import Any
 
@@ -123,10 +124,15 @@ def random_rotation(rng: np.random.Generator) -> Array:
 
 
 _POSE = (4, 4)
+_DOWN = "; where the nine run down the columns, as klampt's do, transpose the 3x3"
+_TWELVE = (
+    "; if they are rows of R and t in turn: numpy.vstack([T.reshape(3, 4), [0, 0, 0, 1]]); if R is before t: "
+    "numpy.vstack([numpy.column_stack([T[:9].reshape(3, 3), T[9:]]), [0, 0, 0, 1]])"
+)
 # What to do with the numbers of a pose in another shape.
 _CURES = {
     (3, 4): "; append the row [0, 0, 0, 1]",
-    (12,): "; if they are rows of R and t in turn: numpy.vstack([T.reshape(3, 4), [0, 0, 0, 1]])",
+    (12,): _TWELVE,
     (16,): "; if they are row after row: T.reshape(4, 4)",
     (3, 3): "; a rotation alone goes into the upper left of numpy.eye(4)",
     (7,): "; a quaternion and a translation: scipy.spatial.transform.Rotation.from_quat(xyzw).as_matrix()",
@@ -176,12 +182,14 @@ def _cure_of(T: Any, name: str) -> str:
         return f"; give its {'detach().cpu().double()' if _has(T, 'detach') else 'cpu()'}.numpy()"
     if _has(T, "GetElement"):  # VTK's matrix, as its transforms have one
         return f"; give numpy.array([[{name}.GetElement(i, j) for j in range(4)] for i in range(4)])"
-    held = next((each for each in _HOLD if _has(T, each)), "")
+    held = next((each for each in _HOLD if _has(T, each) and not _asks(getattr(T, each))), "")
     if held:
         count = None if isinstance(T, dict) else _count(T)  # scipy's RigidTransform may be any number of them
         one = "" if count is None else _one_of(count, name)
         call = f"{held}{'()' if callable(getattr(T, held)) else ''}"
         return f"{one}.{call}" if one else f"; give its {call}"
+    if _has(T, "T") and callable(T.T):  # scikit-robot's Coordinates
+        return "; give its T()"
     for outer, place, turn in _IN_ROS:
         inner = getattr(T, outer) if _has(T, outer) else T
         if _has(inner, place) and _has(inner, turn) and _has(getattr(inner, turn), "w"):
@@ -191,16 +199,27 @@ def _cure_of(T: Any, name: str) -> str:
             )
     apart = next((pair for pair in _APART if _size_of(T, pair[0]) == 9 and _size_of(T, pair[1]) == 3), None)
     if apart and not isinstance(T, dict):
-        R, t = (
-            f"numpy.reshape({name}.{each}, {shape})"
-            for each, shape in zip(apart, ("(3, 3)", "3"), strict=True)
-        )
-        return f"; give numpy.vstack([numpy.column_stack([{R}, {t}]), [0, 0, 0, 1]])"
+        return f"; give {_joined(*(f'{name}.{each}' for each in apart))}"
     if isinstance(T, (tuple, list)) and [_size(each) for each in T] == [9, 3]:
-        return "; of a rotation and a translation: numpy.vstack([numpy.column_stack([R, t]), [0, 0, 0, 1]])"
+        cure = f"; of a rotation and a translation: {_joined(f'{name}[0]', f'{name}[1]')}"
+        return cure if np.ndim(T[0]) > 1 else f"{cure}{_DOWN}"
     if isinstance(T, dict):
         return f"; give the matrix in it, of {', '.join(map(str, T))}"[:200]
     return ""
+
+
+def _joined(R: str, t: str) -> str:
+    parts = f"numpy.column_stack([numpy.reshape({R}, (3, 3)), numpy.reshape({t}, 3)])"
+    return f"numpy.vstack([{parts}, [0, 0, 0, 1]])"
+
+
+def _asks(held: Any) -> bool:
+    """Whether it is a method that must be told something, as scikit-robot's `transformation(other)`."""
+    try:
+        parameters = inspect.signature(held).parameters.values() if callable(held) else ()
+    except (TypeError, ValueError):  # built in
+        return False
+    return any(each.default is each.empty and each.kind < each.VAR_POSITIONAL for each in parameters)
 
 
 def _planar(M: Array, name: str) -> str:

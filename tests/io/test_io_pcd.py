@@ -173,6 +173,14 @@ def test_one_field_that_holds_all_three_coordinates(encoding):
     np.testing.assert_array_equal(parse_pcd(told + body, "a.pcd"), points)
 
 
+def test_text_needs_no_sizes():
+    # As klampt 0.10.1 writes a cloud; "export it again" gave the same file.
+    data = b"VERSION 0.7\nFIELDS x y z\nTYPE F F F\nPOINTS 2\nDATA ascii\n500000.123 2 3\n4 5 6\n"
+    np.testing.assert_array_equal(parse_pcd(data, "a.pcd"), [[500000.123, 2, 3], [4, 5, 6]])
+    with pytest.raises(ValueError, match="0 values of SIZE for 3"):
+        parse_pcd(header(1, "binary", SIZE=None) + bytes(12), "a.pcd")
+
+
 def test_a_unit_in_a_comment_is_believed_and_told_for_the_viewpoint_too():
     data = b"# unit: mm\n" + header(1, "ascii", VIEWPOINT="500 0 0 1 0 0 0") + b"1500 2000 3000\n"
     with pytest.warns(UserWarning, match=r"a\.pcd: its own header says that its unit is 0\.001 m"):

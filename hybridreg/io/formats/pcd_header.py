@@ -46,12 +46,14 @@ def parse_pcd_header(data: bytes, name: str) -> PcdHeader:
     fields = entries.get("FIELDS") or entries.get("COLUMNS") or []
     if not fields:
         raise fault(name, "its header has no FIELDS")
-    sizes = _per_field(entries, "SIZE", len(fields), name)
-    types = _per_field(entries, "TYPE", len(fields), name)
-    counts = _per_field(entries, "COUNT", len(fields), name) if "COUNT" in entries else ["1"] * len(fields)
     encoding = " ".join(entries["DATA"]).lower()
     if encoding not in _ENCODINGS:
         raise fault(name, f"its DATA is {shorten(encoding)}, known are {', '.join(_ENCODINGS)}")
+    if encoding == "ascii":  # where numbers have no size; klampt 0.10.1 gives none
+        entries.setdefault("SIZE", ["8"] * len(fields))
+    sizes = _per_field(entries, "SIZE", len(fields), name)
+    types = _per_field(entries, "TYPE", len(fields), name)
+    counts = _per_field(entries, "COUNT", len(fields), name) if "COUNT" in entries else ["1"] * len(fields)
     return PcdHeader(
         fields=tuple(fields),
         codes=tuple(_code(kind, size, name) for kind, size in zip(types, sizes, strict=True)),

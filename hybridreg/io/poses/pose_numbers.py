@@ -25,7 +25,11 @@ _BELOW = (
     "write three rows of four, with the last row's numbers at their ends; where points are rows that stand before the "
     "matrix, as in MATLAB's affine3d, transpose the rotation, else leave it"
 )
-# How far a quaternion that was written with few digits may be from length 1; by hand.
+_AFTER = (
+    "write three rows of four, a row of the rotation and its number of the translation in each; where the nine run "
+    "down the columns, as klampt's lists do, transpose the rotation"
+)
+# How far a quaternion that was written with few digits may be from length 1, and R R^T from 1; by hand.
 _ROUNDED = 0.03
 # Degrees from which a turn is one of a sensor upside down, and up to which it is hardly any; by hand.
 _OVER, _NEAR_NONE = 150.0, 30.0
@@ -43,7 +47,8 @@ def pose_of_numbers(values: Any, name: str, *, ordered: bool = False) -> Array:
     Raises
     ------
     ValueError
-        Not numbers, another count of them, four rows of three, or a quaternion whose length is not 1.
+        Not numbers, another count of them, four rows of three, nine of a rotation before a translation, or a
+        quaternion whose length is not 1.
     """
     try:
         array = np.array(values, dtype=np.float64)
@@ -64,6 +69,8 @@ def pose_of_numbers(values: Any, name: str, *, ordered: bool = False) -> Array:
         raise fault(name, f"holds {numbers.size} numbers", _ANGLES if numbers.size == _SIX else EXPECTED)
     T = np.eye(4)
     T.flat[: numbers.size] = numbers
+    if numbers.size == 12 and in_one_row and _turns(numbers[:9].reshape(3, 3)) and not _turns(T[:3, :3]):
+        raise fault(name, "holds nine numbers of a rotation and then three of a translation", _AFTER)
     return T
 
 
@@ -99,6 +106,11 @@ def _rotation(quaternion: Array, name: str) -> Array:
         raise fault(name, problem, EXPECTED)
     R: Array = Rotation.from_quat(quaternion).as_matrix()
     return R
+
+
+def _turns(M: Array) -> bool:
+    with np.errstate(over="ignore", invalid="ignore"):
+        return bool(np.abs(M @ M.T - np.eye(3)).max() <= _ROUNDED and np.linalg.det(M) > 0.0)
 
 
 def _tell_order(quaternion: Array, name: str) -> None:
