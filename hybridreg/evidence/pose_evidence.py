@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from hybridreg.evidence import information, one_thing, traffic
+from hybridreg.evidence import information, one_thing, own_carrier, traffic
 from hybridreg.evidence.agreement import Agreement, compare
 from hybridreg.evidence.deformation import (
     bend,
@@ -120,3 +120,8 @@ class PoseEvidence:
     def one_thing(self) -> Array | None:
         """The direction (3,) along which one thing alone holds the pose, and the rest contradicts it, if any."""
         return one_thing.held_by_one(self.views, self.T, self.agreement)
+
+    @cached_property
+    def own_carrier(self) -> float | None:
+        """Metres around both sensors, at one place, within which all stands that agrees, if they see farther."""
+        return own_carrier.rests_on_carrier(self.views, self.T, self.agreement)

@@ -76,6 +76,8 @@ class Doubts:
         Direction along which vehicles alone hold the pose.
     one_thing : (3,) float64 or None
         Direction along which one thing alone holds it, while the rest contradicts it.
+    own_carrier : float or None
+        Metres around both sensors, which stand at one place, within which all stands that agrees.
     """
 
     slack: Tolerance | None
@@ -93,6 +95,7 @@ class Doubts:
     changed_ground: ChangedGround | None = None
     traffic: Array | None = None
     one_thing: Array | None = None
+    own_carrier: float | None = None
 
     def __bool__(self) -> bool:
         return self.about_pose or self.about_source
@@ -100,7 +103,8 @@ class Doubts:
     @property
     def about_pose(self) -> bool:
         """Whether another pose may be right."""
-        found = any(each is not None for each in (self.slack, self.traffic, self.one_thing, self.one_place))
+        told = (self.slack, self.traffic, self.one_thing, self.own_carrier, self.one_place)
+        found = any(each is not None for each in told)
         return found or any((self.through_walls, self.alike, self.lone_thing, self.seen_past, self.corner))
 
     @property
@@ -153,6 +157,7 @@ class Doubts:
             bend=None if strained else at.bend,
             second_layer=None if strained else at.second_layer,
             traffic=None if scene.pair.drawn else at.traffic,
+            own_carrier=None if scene.pair.drawn else at.own_carrier,
         )
         if not doubts.about_source and not scene.pair.drawn:
             doubts = replace(doubts, changed_ground=at.changed_ground)

@@ -67,6 +67,7 @@ def reasons(
         *_upside_down(evidence),
         *of_deformed_clouds(evidence, doubts),
         *_with_traffic(doubts.traffic),
+        *_with_own_carrier(doubts.own_carrier),
         *_with_one_thing(doubts.one_thing),
         *_against(evidence, agreement, held, doubts.through_walls, drawn),
         *_from_one_side(doubts.lone_thing),
@@ -160,6 +161,15 @@ def _with_one_thing(direction: Array | None) -> Iterator[str]:
             f"along ({three(direction)}) of the target one thing alone holds the pose, and most of what else faces "
             "that way lies elsewhere: if that thing moved between the scans, the pose follows it; crop it out of both "
             "clouds, or check by another pair"
+        )
+
+
+def _with_own_carrier(metres: float | None) -> Iterator[str]:
+    if metres is not None:
+        yield (
+            f"the pose puts both sensors at one place, and nothing that stands more than {metres:.0f} m away agrees: "
+            "if they see the vehicle that carries them, it looks so wherever it drives; leave it out of both clouds, "
+            f"points[numpy.linalg.norm(points, axis=1) > {metres:.0f}]"
         )
 
 
