@@ -3,12 +3,12 @@
 
 from __future__ import annotations
 
-import difflib
 from functools import cache
 from importlib import import_module
 from importlib.metadata import entry_points
 from typing import Any
 
+from hybridreg.config.near_name import did_you_mean
 from hybridreg.runtime import optional_packages, plugins
 from hybridreg.slots import SLOTS
 
@@ -81,8 +81,7 @@ def load(slot: str, name: str) -> type[Any]:
         raise KeyError(f"no slot is called {slot!r}; the slots are {', '.join(SLOTS)}")
     target = known().get(f"{slot}.{name}")
     if target is None:
-        near = difflib.get_close_matches(name, names(slot), n=1)
-        hint = f"; did you mean {near[0]!r}?" if near else "."
+        hint = did_you_mean(name, names(slot)) or "."
         raise KeyError(f"no {slot} stage is called {name!r}{hint} Known: {', '.join(names(slot))}")
     if f"{slot}.{name}" not in BUILT_IN:
         return plugins.load(target, f"{slot} stage {name!r}", ENTRY_POINTS)

@@ -4,12 +4,12 @@
 from __future__ import annotations
 
 import dataclasses
-import difflib
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, ClassVar, NoReturn
 
 import numpy as np
 
+from hybridreg.config.near_name import did_you_mean
 from hybridreg.config.typed_fields import typed
 
 if TYPE_CHECKING:
@@ -96,10 +96,10 @@ def _replaced(stage: Any, changes: Mapping[str, Any]) -> Any:
     own, known = own_changes(stage, changes), list(own_params(stage))
     for name in own:
         if name not in known:
-            near = difflib.get_close_matches(name, known, n=1)
-            hint = f"; did you mean {near[0]!r}?" if near else ""
             has = f"its fields are {', '.join(known)}" if known else "it has none"
-            raise TypeError(f"{type(stage).__name__} has no field {name!r}{hint} ({has})")
+            raise TypeError(
+                f"{type(stage).__name__} has no field {name!r}{did_you_mean(name, known)} ({has})"
+            )
     return dataclasses.replace(stage, **own)
 
 

@@ -10,6 +10,7 @@ across it, and the few surfaces that face along the street decide whether the cl
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -120,6 +121,27 @@ def in_target(views: Views, agreement: Agreement) -> list[tuple[View, OneWay, Ar
         (source, forth, forth.moved, forth.normals),
         (target, back, target.points[target.asked], target.normals[target.asked]),
     ]
+
+
+class Compared(NamedTuple):
+    """The sampled points (n, 3) of both clouds under a pose, the source's first, with their normals in the target's
+    frame, and which were looked at and agree."""
+
+    points: Array
+    normals: Array
+    looked: NDArray[np.bool_]
+    agrees: NDArray[np.bool_]
+
+
+def compared(views: Views, agreement: Agreement) -> Compared:
+    """`in_target`, both clouds in one."""
+    rows = in_target(views, agreement)
+    return Compared(
+        points=np.concatenate([points for _, _, points, _ in rows]),
+        normals=np.concatenate([normals for *_, normals in rows]),
+        looked=np.concatenate([way.looked for _, way, *_ in rows]),
+        agrees=np.concatenate([way.agrees for _, way, *_ in rows]),
+    )
 
 
 def compare(views: Views, T_target_source: Array, stride: int = 1) -> Agreement:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from hybridreg.evidence.agreement import Agreement, in_target
+from hybridreg.evidence.agreement import Agreement, compared
 from hybridreg.evidence.things import GROUND, things
 from hybridreg.evidence.traffic import LEVEL, least_held
 from hybridreg.evidence.views import Views
@@ -38,15 +38,11 @@ def held_by_one(views: Views, T_target_source: Array, agreement: Agreement) -> A
     if up is None or ground is None:
         return None
     level = ground.levelling[:2]
-    rows = in_target(views, agreement)
-    normals = np.concatenate([facing for *_, facing in rows])
-    looked, agrees = (
-        np.concatenate([getattr(way, what) for _, way, *_ in rows]) for what in ("looked", "agrees")
-    )
+    points, normals, looked, agrees = compared(views, agreement)
     thing = _things(views, T_target_source)
     upright = looked & (thing != GROUND) & (np.abs(normals @ up) < LEVEL)
     flat, holds = normals @ level.T, upright & agrees
-    places = np.concatenate([points for _, _, points, _ in rows]) @ level.T
+    places = points @ level.T
     most = _SMALL * _extent(places[thing != GROUND]) if holds.any() else 0.0
     each, counts = np.unique(thing[holds], return_counts=True)
     for one in each[np.argsort(-counts)][:_TRIED]:

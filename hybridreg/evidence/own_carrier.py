@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybridreg.cloud import PointCloud
-from hybridreg.evidence.agreement import Agreement, in_target
+from hybridreg.evidence.agreement import Agreement, compared
 from hybridreg.evidence.traffic import LEVEL
 from hybridreg.evidence.views import View, Views
 from hybridreg.geometry import se3
@@ -43,12 +43,7 @@ def rests_on_carrier(views: Views, T_target_source: Array, agreement: Agreement)
     other, place = (_place(views, side) for side in SIDES)
     if np.linalg.norm(se3.apply(T_target_source, other[None])[0] - place) > _APART:
         return None
-    rows = in_target(views, agreement)
-    points = np.concatenate([points for _, _, points, _ in rows])
-    normals = np.concatenate([facing for *_, facing in rows])
-    looked, agrees = (
-        np.concatenate([getattr(way, what) for _, way, *_ in rows]) for what in ("looked", "agrees")
-    )
+    points, normals, looked, agrees = compared(views, agreement)
     off_ground = ground.above(points) > _OFF_GROUND * views.target.thickness
     holds = looked & agrees & off_ground & (np.abs(normals @ views.up) < LEVEL)
     away = np.linalg.norm(points - place, axis=1)

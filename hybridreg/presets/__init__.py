@@ -3,12 +3,12 @@
 
 from __future__ import annotations
 
-import difflib
 import os
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
+from hybridreg.config.near_name import did_you_mean
 from hybridreg.slots import SLOTS
 
 DEFAULT = "default"
@@ -28,8 +28,7 @@ def load(name: str) -> dict[str, Any]:
         A name that does not exist; it lists those that do.
     """
     if name not in names():
-        near = difflib.get_close_matches(str(name), names(), n=1)
-        hint = f"; did you mean {near[0]!r}?" if near else "."
+        hint = did_you_mean(str(name), names()) or "."
         raise KeyError(f"no preset is called {name!r}{hint} Known: {', '.join(names())}")
     from hybridreg.io.structured import parse_toml
 

@@ -159,11 +159,11 @@ class Doubts:
             traffic=None if scene.pair.drawn else at.traffic,
             own_carrier=None if scene.pair.drawn else at.own_carrier,
         )
-        if not doubts.about_source and not scene.pair.drawn:
-            doubts = replace(doubts, changed_ground=at.changed_ground)
-        if scene.pair.drawn or doubts.about_source:  # of a deformed cloud most lies elsewhere
+        if scene.pair.drawn or doubts.about_source:
             return doubts
-        return replace(doubts, one_thing=at.one_thing)
+        doubts = replace(doubts, changed_ground=at.changed_ground)
+        # Of a deformed cloud most lies elsewhere.
+        return doubts if doubts.about_source else replace(doubts, one_thing=at.one_thing)
 
 
 def is_right_but_for_size(scene: Scene, at: PoseEvidence, evidence: Evidence) -> bool:

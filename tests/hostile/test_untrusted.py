@@ -25,6 +25,7 @@ from hybridreg.data.simulate.simulated_folder import read_pair
 from hybridreg.eval import PROTOCOLS, stored_table, table_file, table_run
 from hybridreg.eval.report import table_report
 from hybridreg.eval.report.rerun_for_pictures import redraw
+from hybridreg.eval.scored_table import Entry, Table
 from hybridreg.io import read_image, read_points, write_points
 from hybridreg.learned.cross3dreg.sizes import named_config
 from hybridreg.learned.training import checkpoint, recipe_file
@@ -241,8 +242,8 @@ def test_a_report_holds_no_markup_of_the_predictions(tmp_path: Path, text: str) 
     path = tmp_path / "p.jsonl"
     path.write_text("\n".join(json.dumps(each) for each in (content, *stored)) + "\n")
     done = stored_table.of_files([path])
-    renamed = stored_table.Entry(name=text, rows=done.methods[0].rows, config=done.methods[0].config)
-    hostile = stored_table.Table(title=text, data=text, seed=0, starts=0, entries=[done.entries[0], renamed])
+    renamed = Entry(name=text, rows=done.methods[0].rows, config=done.methods[0].config)
+    hostile = Table(title=text, data=text, seed=0, starts=0, entries=[done.entries[0], renamed])
     table_report.write(hostile, [PROTOCOLS["cross3dreg"]], tmp_path / "report")
     assert text not in (tmp_path / "report" / "report.html").read_text(encoding="utf-8")
 
